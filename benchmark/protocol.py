@@ -1,0 +1,34 @@
+"""What a model is. A class with these two methods is a model; it need not import simgap."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.records import TrainingSet
+
+
+@runtime_checkable
+class Model(Protocol):
+    """A model of a machine, fitted to measured data and simulated without them.
+
+    Hyper-parameters are the fields of a dataclass; `fit` starts from nothing each time it is called.
+    Three attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
+    what the fit chose (an order, say) that goes into the results; `summary()`, a text for people.
+    """
+
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        """Estimate the model from `data.train` and `data.valid`; all randomness comes from `seed`."""
+        ...
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Simulate B experiments from all T inputs and the first n measured outputs, oldest first.
+
+        Returns the outputs of rows n .. T-1, in physical units. A free run is one long experiment, an h-step
+        forecast is many short ones.
+        """
+        ...

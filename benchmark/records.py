@@ -1,0 +1,206 @@
+"""The records that every part of simgap speaks in: rows are samples, units are physical."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+Kind = Literal["position", "velocity", "level", "other"]
+Status = Literal["ok", "diverged", "error", "timeout"]
+
+# No measurement is larger; squares and sums of squares of such values still fit into float64.
+LARGEST_VALUE = 1e100
+
+
+class UnusableInput(ValueError):
+    """What the user gave cannot be used; the message is one sentence that says where and what to do."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of `u` or `y`: its name, its physical unit and, for outputs, what kind of motion it is."""
+
+    name: str
+    unit: str = ""
+    kind: Kind = "other"
+
+
+@dataclass(frozen=True)
+class Channels:
+    """The columns of `u` and of `y`, in order."""
+
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+
+    @classmethod
+    def unnamed(cls, nu: int, ny: int) -> Channels:
+        """Channels u0, u1, ... and y0, y1, ... for arrays that came without names."""
+        return cls(tuple(Channel(f"u{i}") for i in range(nu)), tuple(Channel(f"y{i}") for i in range(ny)))
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One uninterrupted record: u [T, nu], y [T, ny], sampled every dt seconds.
+
+    The arrays are float64, two-dimensional and read-only. `experiment[a:b]` is the record of those samples.
+    Raises UnusableInput when the shapes do not fit, dt is not positive, or a value is not finite.
+    """
+
+    name: str
+    u: Float[np.ndarray, "T nu"]
+    y: Float[np.ndarray, "T ny"]
+    dt: float
+
+    def __post_init__(self) -> None:
+        for column in ("u", "y"):
+            values = np.asarray(getattr(self, column), dtype=np.float64).view()
+            if values.ndim != 2:
+                raise UnusableInput(
+                    f"{self.name}: {column} has {values.ndim} dimensions; give rows of samples, [T, n{column}]"
+                )
+            if not np.all(np.abs(values) <= LARGEST_VALUE):
+                row, channel = np.argwhere(~(np.abs(values) <= LARGEST_VALUE))[0]
+                raise UnusableInput(
+                    f"{self.name}: {column}[{row}, {channel}] is {values[row, channel]}, which is no measurement; "
+                    f"correct it or cut the record before it"
+                )
+            values.flags.writeable = False
+            object.__setattr__(self, column, values)
+        if len(self.u) != len(self.y):
+            raise UnusableInput(
+                f"{self.name}: u has {len(self.u)} samples and y has {len(self.y)}; cut them to the same length"
+            )
+        object.__setattr__(self, "dt", float(self.dt))
+        if not (0 < self.dt < np.inf):
+            raise UnusableInput(f"{self.name}: the sampling time is {self.dt} s; it must be positive")
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def __getitem__(self, samples: slice) -> Experiment:
+        if not isinstance(samples, slice) or samples.step not in (None, 1):
+            raise TypeError("an experiment is cut with a plain slice such as experiment[100:200]")
+        return Experiment(self.name, self.u[samples], self.y[samples], self.dt)
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSet:
+    """All that `fit` ever sees: experiments to train on, experiments to validate on, and n_init.
+
+    n_init is the number of measured output samples that a simulation may use to find its state.
+    There is no test field, so test data cannot leak into a model.
+    """
+
+    train: tuple[Experiment, ...]
+    valid: tuple[Experiment, ...]
+    n_init: int
+    channels: Channels = None  # type: ignore[assignment]  # filled in below when the data came without names
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "train", tuple(self.train))
+        object.__setattr__(self, "valid", tuple(self.valid))
+        if not self.train:
+            raise UnusableInput("the training split is empty; give at least one training experiment")
+        first = self.train[0]
+        if self.channels is None:
+            object.__setattr__(self, "channels", Channels.unnamed(first.u.shape[1], first.y.shape[1]))
+        _check_alike(self.train + self.valid, self.channels)
+        if self.n_init < 1:
+            raise UnusableInput(f"n_init is {self.n_init}; a simulation needs at least one measured sample to start")
+
+    @property
+    def dt(self) -> float:
+        """Sampling time in seconds."""
+        return self.train[0].dt
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """A named data set: what a model may learn from, and the test experiments it is scored on."""
+
+    name: str
+    training: TrainingSet
+    test: tuple[Experiment, ...]
+    n_init: int
+    channels: Channels
+    sha256: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "test", tuple(self.test))
+        # The name becomes a path and a page title, so it may hold nothing that means something there.
+        if not re.fullmatch(r"[A-Za-z0-9][\w.\- ]{0,79}", self.name):
+            raise UnusableInput(
+                f"the data set name {self.name!r} is not usable; use letters, digits, '_', '-', '.', at most 80"
+            )
+        if not self.test:
+            raise UnusableInput(f"{self.name}: the test split is empty; give at least one test experiment")
+        _check_alike(self.training.train + self.test, self.channels)
+        if self.n_init != self.training.n_init:
+            raise UnusableInput(f"{self.name}: n_init differs between training and test")
+        for experiment in self.test:
+            if len(experiment) <= self.n_init:
+                raise UnusableInput(
+                    f"{self.name}: test experiment {experiment.name} has {len(experiment)} samples, "
+                    f"of which n_init = {self.n_init} start the simulation; nothing is left to score"
+                )
+        if not self.sha256:
+            object.__setattr__(self, "sha256", self._digest())
+
+    def _digest(self) -> str:
+        digest = hashlib.sha256()
+        training = self.training
+        for split in (training.train, training.valid, self.test):
+            digest.update(f"{len(split)} {self.n_init}".encode())
+            for experiment in split:
+                digest.update(f"{experiment.u.shape} {experiment.y.shape} {experiment.dt!r}".encode())
+                digest.update(np.ascontiguousarray(experiment.u).tobytes())
+                digest.update(np.ascontiguousarray(experiment.y).tobytes())
+        return digest.hexdigest()
+
+
+def _check_alike(experiments: tuple[Experiment, ...], channels: Channels) -> None:
+    nu, ny, dt = len(channels.inputs), len(channels.outputs), experiments[0].dt
+    if nu < 1 or ny < 1:
+        raise UnusableInput("a data set needs at least one input and one output")
+    for experiment in experiments:
+        if experiment.u.shape[1] != nu or experiment.y.shape[1] != ny:
+            raise UnusableInput(
+                f"{experiment.name}: {experiment.u.shape[1]} inputs and {experiment.y.shape[1]} outputs, "
+                f"where {nu} and {ny} are declared; every experiment needs the same columns"
+            )
+        if abs(experiment.dt - dt) > 1e-9 * dt:
+            raise UnusableInput(
+                f"{experiment.name}: sampled every {experiment.dt} s, the first experiment every {dt} s; "
+                f"resample them to one sampling time first"
+            )
+
+
+@dataclass(frozen=True)
+class Result:
+    """One line of the store: one model, simulated on one experiment of one data set, for one task and seed.
+
+    `metrics` maps each output's name to its figures, in physical units. `message` says why when the status is
+    not ok, and carries warnings of the fit when it is. `fitted` is what the fit chose, such as an order.
+    """
+
+    model: str
+    params: dict[str, Any]
+    dataset: str
+    experiment: str
+    task: str
+    seed: int
+    status: Status
+    metrics: dict[str, dict[str, Any]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    fitted: dict[str, Any] = field(default_factory=dict)
+    n_params: int | None = None
+    fit_seconds: float | None = None
+    simulate_seconds: float | None = None
+    message: str = ""
+    provenance: dict[str, Any] = field(default_factory=dict)
+    schema: int = 1

@@ -1,0 +1,143 @@
+"""Names for models and data sets. A new one is one new file with one decorator."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, TypeVar
+
+from simgap.records import UnusableInput
+
+T = TypeVar("T")
+
+
+@dataclass
+class Registry:
+    """Things of one kind by name, found by scanning packages for `@REGISTRY.register("name")`.
+
+    The scan reads the files without running them, so listing names imports nothing and asking for one name
+    imports one module. A module that cannot be imported spoils only its own names.
+    """
+
+    kind: str
+    packages: tuple[str, ...]
+    constant: str
+    _found: dict[str, Any] = field(default_factory=dict)
+    _modules: dict[str, str] | None = None
+
+    def register(self, name: str) -> Callable[[T], T]:
+        """Class or function decorator that files its target under `name`; a name taken twice is an error."""
+
+        def add(target: T) -> T:
+            taken = self._found.get(name)
+            if taken is not None and (taken.__module__, taken.__qualname__) != (
+                target.__module__,
+                target.__qualname__,
+            ):
+                raise ValueError(f"two {self.kind}s are called {name!r}: {taken!r} and {target!r}")
+            self._found[name] = target
+            return target
+
+        return add
+
+    def names(self) -> list[str]:
+        """All names, those of importable and of broken modules alike, in alphabetical order."""
+        return sorted({*self._index(), *self._found, *self._plugins()})
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names())
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names()
+
+    def __getitem__(self, name: str) -> Any:
+        """The thing called `name`. Raises UnusableInput for an unknown name or a module that does not import."""
+        if name in self._found:
+            return self._found[name]
+        if name in self._index():
+            module = self._index()[name]
+            try:
+                importlib.import_module(module)
+            except ImportError as error:
+                raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
+            return self._found[name]
+        if name in self._plugins():
+            try:
+                return self._plugins()[name].load()
+            except Exception as error:  # a stranger's package may fail in any way
+                raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
+        raise UnusableInput(f"there is no {self.kind} called {name!r}; known are {', '.join(self.names())}")
+
+    def why_missing(self, name: str) -> str:
+        """Empty when `name` can be used, else the reason why not."""
+        try:
+            self[name]
+        except UnusableInput as error:
+            return str(error)
+        return ""
+
+    def _plugins(self) -> dict[str, Any]:
+        return {point.name: point for point in entry_points(group=f"simgap.{self.kind.replace(' ', '')}s")}
+
+    def _index(self) -> dict[str, str]:
+        if self._modules is None:
+            self._modules = {}
+            for package in self.packages:
+                for module, path in _files(package):
+                    self._modules |= dict.fromkeys(_registered_names(path, self.constant), module)
+        return self._modules
+
+
+def _files(package: str) -> Iterator[tuple[str, Path]]:
+    spec = importlib.util.find_spec(package)
+    for folder in (spec.submodule_search_locations if spec else None) or ():
+        for path in sorted(Path(folder).glob("*.py")):
+            yield f"{package}.{path.stem}", path
+
+
+def _registered_names(path: Path, constant: str) -> list[str]:
+    names = []
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except SyntaxError:
+        return []  # importing the file by hand tells its author more than we could
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(
+                func=ast.Attribute(value=ast.Name(id=found), attr="register"),
+                args=[ast.Constant(value=str(name))],
+            ) if found == constant:
+                names.append(name)
+    return names
+
+
+MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")
+DATASETS = Registry("dataset", ("simgap.data",), "DATASETS")
+
+
+def load_class(reference: str) -> type:
+    """The class behind `path/to/file.py:Class`. Raises UnusableInput when either does not exist."""
+    file, _, name = reference.rpartition(":")
+    path = Path(file)
+    if not file or path.suffix != ".py":
+        raise UnusableInput(f"--model {reference}: write it as path/to/my_model.py:MyModel")
+    if not path.is_file():
+        raise UnusableInput(f"--model {reference}: there is no file {path}")
+    module_name = f"simgap_user_{path.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    assert spec is not None and spec.loader is not None  # a .py file that exists always has a loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module  # dataclasses look their module up there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise UnusableInput(f"--model {reference}: the file does not import: {error!r}") from error
+    if not isinstance(getattr(module, name, None), type):
+        raise UnusableInput(f"--model {reference}: {path} holds no class {name}")
+    return getattr(module, name)
