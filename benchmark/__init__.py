@@ -1,3 +1,51 @@
 """simgap: classical and neural system identification on one bench, by free-run simulation."""
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from simgap.data import Missing, describe, fetch, load, save
+    from simgap.fitting import Fit, fit
+    from simgap.protocol import Model
+    from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
+    from simgap.registry import DATASETS, MODELS
+    from simgap.reports.leaderboard import report
+    from simgap.runner import Progress, run
+    from simgap.suites import Suite, load_suite
+
 __version__ = "0.1.0"
+
+_HOME = {
+    "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
+    "simgap.fitting": ("Fit", "fit"),
+    "simgap.protocol": ("Model",),
+    "simgap.records": (
+        "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
+    ),
+    "simgap.registry": ("DATASETS", "MODELS"),
+    "simgap.reports.leaderboard": ("report",),
+    "simgap.runner": ("Progress", "run"),
+    "simgap.suites": ("Suite", "load_suite"),
+}  # fmt: skip
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "DATASETS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
+    "Progress", "Result", "Suite", "TrainingSet", "UnusableInput", "describe", "fetch", "fit", "load",
+    "load_suite", "report", "run", "save",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Import a part on its first use, so that `import simgap` stays fast."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'simgap' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

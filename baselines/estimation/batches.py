@@ -1,0 +1,17 @@
+"""Experiments of equal length, stacked so that one call filters them all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from simgap.records import Experiment
+
+
+def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(u [B, T, nu], y [B, T, ny]) for each length T that occurs; order within a length is kept."""
+    by_length: dict[int, list[Experiment]] = {}
+    for experiment in experiments:
+        by_length.setdefault(len(experiment), []).append(experiment)
+    return [(np.stack([e.u for e in group]), np.stack([e.y for e in group])) for group in by_length.values()]

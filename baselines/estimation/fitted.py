@@ -1,0 +1,118 @@
+"""What an identification returns: the model, its coefficients with standard errors, and its warnings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.baselines.estimation.gram import thin_sample
+from simgap.baselines.estimation.orders import Orders
+from simgap.baselines.estimation.polynomial import Polynomial
+from simgap.records import Experiment
+
+
+class IdentificationWarning(UserWarning):
+    """The model was identified, but the reader should know something before trusting it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """The equation of one output: coefficient names, values [p], covariance [p, p] and residual variance."""
+
+    names: tuple[str, ...]
+    values: Float[np.ndarray, " p"]
+    covariance: Float[np.ndarray, "p p"]
+    variance: float
+    rank: int
+    converged: bool = True
+
+    @property
+    def standard_errors(self) -> Float[np.ndarray, " p"]:
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """An identified linear model, one `Row` per output, from `samples` samples.
+
+    `constants` [ny] is what each equation adds for an operating point away from that of the estimation.
+    """
+
+    polynomial: Polynomial
+    orders: Orders
+    rows: tuple[Row, ...]
+    constants: Float[np.ndarray, " ny"]
+    samples: int
+
+    @property
+    def n_params(self) -> int:
+        """How many coefficients were estimated."""
+        return sum(len(row.values) for row in self.rows)
+
+    def criterion(self, penalty: float) -> float:
+        """sum_i N log(V_i) + penalty * p: AIC for penalty 2, BIC for log N (Ljung 1999, section 16.4)."""
+        variances = [row.variance * max(1 - len(row.values) / self.samples, 1e-9) for row in self.rows]
+        return float(self.samples * np.sum(np.log(np.maximum(variances, 1e-300)))) + penalty * self.n_params
+
+    def warn(self) -> None:
+        """Say why, where the data do not excite the model, the search did not end, or the model is unstable."""
+        if not all(row.converged for row in self.rows):
+            warnings.warn(
+                "the search stopped before the error was at its minimum; try a lower order",
+                IdentificationWarning,
+                stacklevel=2,
+            )
+        for row in self.rows:
+            if row.rank < len(row.values):
+                warnings.warn(
+                    f"the data do not excite the model: only {row.rank} of {len(row.values)} regressors are "
+                    f"independent, so the coefficients are not unique; lower the order or use a richer input",
+                    IdentificationWarning,
+                    stacklevel=2,
+                )
+                break
+        radius = float(np.abs(self.polynomial.poles).max(initial=0.0))
+        # Integrators are identified as poles at 1 give or take rounding and noise; they grow like time, not like e^t.
+        if radius > 1 + 1e-3:
+            tenfold = self.polynomial.dt * np.log(10) / np.log(radius)
+            warnings.warn(
+                f"the identified model is unstable: a pole of magnitude {radius:.4g} makes a free run grow tenfold "
+                f"every {tenfold:.3g} s; try another order, simulation error (oe), or data without feedback",
+                IdentificationWarning,
+                stacklevel=2,
+            )
+
+    def table(self) -> str:
+        """Every coefficient with its standard error."""
+        lines = []
+        for output, row in enumerate(self.rows):
+            lines.append(f"output {output + 1}: residual standard deviation {np.sqrt(row.variance):.4g}")
+            for name, value, error in zip(row.names, row.values, row.standard_errors, strict=True):
+                lines.append(f"  {name:<8} {value:>12.6g} +- {error:.2g}")
+        return "\n".join(lines)
+
+
+def operating_point(
+    a: Float[np.ndarray, "N1 ny ny"],
+    b: Float[np.ndarray, "N1 ny nu"],
+    constant: Float[np.ndarray, " ny"],
+    experiments: Sequence[Experiment],
+    shift: Float[np.ndarray, " S"],
+) -> tuple[Float[np.ndarray, " ny"], Float[np.ndarray, " nu"]]:
+    """y_mean and u_mean that express A(q) (y - y_0) = B(q) (u - u_0) + constant without the constant.
+
+    The smallest move, in standard deviations of the signals, with A(1) dy - B(1) du = constant; it exists for an
+    integrator, too, where A(1) = 0.
+    """
+    ny = a.shape[1]
+    if not constant.any():
+        return shift[:ny], shift[ny:]
+    spread = thin_sample(experiments).std(axis=0)
+    spread[spread == 0] = 1.0
+    gains = np.hstack((a.sum(axis=0), -b.sum(axis=0))) * spread  # [ny, ny + nu]
+    moved = shift + spread * (np.linalg.pinv(gains) @ constant)
+    return moved[:ny], moved[ny:]

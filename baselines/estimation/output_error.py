@@ -1,0 +1,274 @@
+"""Output error: y = B(q)/F(q) u + e by minimising the error of the simulation itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from simgap.baselines.estimation.batches import stack
+from simgap.baselines.estimation.equation_error import check_length, estimate_arx
+from simgap.baselines.estimation.fitted import LinearFit, Row
+from simgap.baselines.estimation.gram import lagged_gram
+from simgap.baselines.estimation.levenberg import Cost, Minimum, minimise, stable, sum_up
+from simgap.baselines.estimation.orders import Orders
+from simgap.baselines.estimation.polynomial import Polynomial
+from simgap.records import Experiment
+
+
+def estimate_oe(
+    experiments: Sequence[Experiment],
+    shift: Float[np.ndarray, " S"],
+    orders: Orders,
+    constant: bool = True,
+    n_start: int | None = None,
+) -> LinearFit:
+    """Minimise the squared simulation error, one output at a time, F kept stable (Ljung 1999, section 10.2).
+
+    With n_start, each simulation starts from the state that the first n_start samples show, and only what follows
+    counts: the error that is minimised is the free run that will be scored. Without it the start states are free
+    parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
+    Raises UnusableInput when the experiments are too short for the order.
+    """
+    ny = len(orders.nb)
+    rows, transfers, constants = [], [], np.zeros(ny)
+    for i in range(ny):
+        equation = OutputError.of(experiments, shift, orders, i, constant, n_start)
+        samples = equation.samples
+        check_length(samples, equation.n_params, equation.n_start or 0)
+        starts = sorted(
+            _starts(experiments, shift, orders, i, equation), key=lambda theta: equation.cost(theta).squares
+        )
+        searches = [minimise(equation.cost, theta, equation.allowed, samples) for theta in starts[:2]]
+        best = min(searches, key=lambda search: search.cost.squares)
+        rows.append(_row(best, equation))
+        transfers.append(equation.transfer(best.theta))
+        constants[i] = best.theta[-1] if constant else 0.0
+    return _assemble(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
+
+
+@dataclass(frozen=True, eq=False)
+class OutputError:
+    """One output, y = sum_j B_j/F_j u_j + constant + R z + e, for each group of experiments of one length.
+
+    theta holds, for each input with nb > 0, the nf coefficients of F_j, then the nb of B_j; the constant is last.
+    R [T, N] are the free responses of 1/(F_1 F_2 ..), all that the plant's past can cause; z is eliminated at every
+    point by least squares on the first n_start samples, or on all of them where n_start is None.
+    """
+
+    u: list[Float[np.ndarray, "B T nu"]]
+    y: list[Float[np.ndarray, "B T"]]
+    nf: tuple[int, ...]
+    nb: tuple[int, ...]
+    nk: tuple[int, ...]
+    constant: bool
+    n_start: int | None
+
+    @classmethod
+    def of(
+        cls, experiments, shift: np.ndarray, orders: Orders, output: int, constant: bool, n_start: int | None
+    ):
+        ny = len(orders.nb)
+        numbers = (tuple(int(n) for n in of[output]) for of in (orders.nf, orders.nb, orders.nk))
+        empty = cls([], [], *numbers, constant, None)
+        if n_start is not None:  # fewer samples than the state would leave it undetermined
+            n_start = max(n_start, empty.state + 1)
+        groups = [
+            (u - shift[ny:], y[:, :, output] - shift[output])
+            for u, y in stack(experiments)
+            if u.shape[1] > (n_start or empty.state)
+        ]
+        return replace(empty, u=[u for u, _ in groups], y=[y for _, y in groups], n_start=n_start)
+
+    @property
+    def samples(self) -> int:
+        """How many errors count."""
+        return sum(y.shape[0] * (y.shape[1] - (self.n_start or self.state)) for y in self.y)
+
+    @property
+    def used(self) -> list[int]:
+        """The inputs that act on this output."""
+        return [j for j, nb in enumerate(self.nb) if nb]
+
+    @property
+    def n_params(self) -> int:
+        return sum(self.nf[j] + self.nb[j] for j in self.used) + self.constant
+
+    @property
+    def state(self) -> int:
+        """Past samples that act on the future: of the outputs through F, of the inputs through B."""
+        poles = sum(self.nf[j] for j in self.used)
+        return max(max(poles, poles - self.nf[j] + self.nb[j] + self.nk[j] - 1) for j in self.used)
+
+    def split(self, theta: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, slice]]:
+        """(input, B with its delay, monic F, where the pair stands in theta)."""
+        at = 0
+        for j in self.used:
+            middle, end = at + self.nf[j], at + self.nf[j] + self.nb[j]
+            f = np.concatenate(([1.0], theta[at:middle]))
+            yield j, np.concatenate((np.zeros(self.nk[j]), theta[middle:end])), f, slice(at, end)
+            at = end
+
+    def transfer(self, theta: np.ndarray) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+        """The same over one denominator: F_1 F_2 .., and B_j times the F of the other inputs."""
+        parts = list(self.split(theta))
+        common, numerators = np.ones(1), {}
+        for j, b, f, _ in parts:
+            common = np.convolve(common, f)
+            numerators[j] = b
+            for other, _, f_other, _ in parts:
+                if other != j:
+                    numerators[j] = np.convolve(numerators[j], f_other)
+        return common, numerators
+
+    def allowed(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Points whose poles are stable or integrate, so that a simulation cannot run away."""
+        candidates = [theta.copy(), theta.copy()]
+        for j, _, f, part in self.split(theta):
+            repaired = stable(f, radius=1.0)
+            for candidate, choice in zip(candidates, (repaired[0], repaired[-1]), strict=True):
+                candidate[part.start : part.start + self.nf[j]] = choice[1:]
+        return candidates if (candidates[0] != candidates[1]).any() else candidates[:1]
+
+    def cost(self, theta: np.ndarray) -> Cost:
+        """|e|^2, half its gradient and J' J."""
+        return sum_up(self.linearised(theta))
+
+    def linearised(self, theta: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """e [B, T-n] and de/dtheta [p, B, T-n] of each group (n = 0 without n_start).
+
+        de/db_k = -q^-k u/F and de/df_k = q^-k (B/F) u/F (Ljung 1999, eq. 10.50). The start is eliminated by variable
+        projection: e = P r with P = 1 - R pinv(R_n) over the first n samples (Golub and Pereyra 1973).
+        """
+        for u, y in zip(self.u, self.y, strict=True):
+            filtered = {j: lfilter([1.0], f, u[:, :, j]) for j, _, f, _ in self.split(theta)}
+            responses = {j: lfilter(b, [1.0], filtered[j]) for j, b, _, _ in self.split(theta)}
+            residual = y - sum(responses.values()) - (theta[-1] if self.constant else 0.0)
+            free, inverse = self._free_responses(theta, y.shape[1])
+            n = inverse.shape[1]
+            start = residual[:, :n] @ inverse.T @ free.T  # what the plant's past adds to the output
+            e = residual - start
+            slope = self._slope(theta, filtered, responses, start)
+            slope -= slope[:, :, :n] @ inverse.T @ free.T
+            if n < y.shape[1]:
+                self._add_change_of_fit(slope, theta, free, inverse, e[:, :n])
+                e, slope = e[:, n:], slope[:, :, n:]
+            yield e, slope
+
+    def _free_responses(self, theta: np.ndarray, length: int) -> tuple[np.ndarray, np.ndarray]:
+        """R [T, N], and the pseudo-inverse [N, n] of its first n_start rows."""
+        common, _ = self.transfer(theta)
+        free = lfilter([1.0], common, np.eye(self.state, length)).T
+        return free, np.linalg.pinv(free[: self.n_start], rcond=1e-10)
+
+    def _slope(self, theta: np.ndarray, filtered: dict, responses: dict, start: np.ndarray) -> np.ndarray:
+        """de/dtheta [p, B, T] at a fixed z, whose response rings through every F as the others do."""
+        slope = np.zeros((self.n_params, *start.shape))
+        length = start.shape[1]
+        for j, _, f, part in self.split(theta):
+            twice = lfilter([1.0], f, responses[j] + start)
+            for k in range(1, self.nf[j] + 1):
+                slope[part.start + k - 1, :, k:] = twice[:, : length - k]
+            for k in range(self.nb[j]):
+                lag = self.nk[j] + k
+                slope[part.start + self.nf[j] + k, :, lag:] = -filtered[j][:, : length - lag]
+        if self.constant:
+            slope[-1] = -1.0
+        return slope
+
+    def _add_change_of_fit(
+        self, slope: np.ndarray, theta: np.ndarray, free, inverse, misfit: np.ndarray
+    ) -> None:
+        """The part of dz/df that the misfit [B, n] of the first samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
+        n = misfit.shape[1]
+        spread = free @ (inverse @ inverse.T)  # [T, N]
+        for j, _, f, part in self.split(theta):
+            change = lfilter([1.0], f, free[:n], axis=0)
+            for k in range(1, self.nf[j] + 1):
+                slope[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
+
+
+def _starts(
+    experiments: Sequence[Experiment], shift: np.ndarray, orders: Orders, output: int, equation: OutputError
+) -> Iterator[np.ndarray]:
+    """Where to begin: ARX on the data and on the free run of a long ARX, each refined by Steiglitz and McBride (1965)."""
+    ny = len(orders.nb)
+    kept = [output, *range(ny, len(shift))]
+    own = [Experiment(e.name, e.u, e.y[:, output : output + 1], e.dt) for e in experiments]
+    yield from _prefiltered(own, shift[kept], orders, output, equation)
+    lags = max(orders.max_lag, int(orders.nf.max()))
+    length = min(3 * lags + 20, min(map(len, own)) // 4, sum(map(len, own)) // (4 * len(kept)))
+    if length > lags:
+        long = Orders.of(1, len(kept) - 1, na=length, nb=length, nk=1)
+        model = estimate_arx(lagged_gram(own, shift[kept], length), long).polynomial
+        if np.abs(model.poles).max() < 1:
+            n = model.order
+            smooth = [
+                Experiment(e.name, e.u[n:], model.simulate(e.u[None], e.y[None, :n])[0], e.dt) for e in own
+            ]
+            yield from _prefiltered(smooth, shift[kept], orders, output, equation)
+
+
+def _prefiltered(
+    experiments: Sequence[Experiment], shift: np.ndarray, orders: Orders, output: int, equation: OutputError
+) -> Iterator[np.ndarray]:
+    """theta of ARX fits to u/F and y/F, with F from the fit before."""
+    nf = max((equation.nf[j] for j in equation.used), default=0)
+    arx = Orders.of(1, len(equation.nb), na=nf, nb=[list(equation.nb)], nk=[list(equation.nk)])
+    f = np.ones(1)
+    for _ in range(8):
+        filtered = [
+            Experiment(
+                e.name,
+                lfilter([1.0], f, e.u - shift[1:], axis=0),
+                lfilter([1.0], f, e.y - shift[0], axis=0),
+                e.dt,
+            )
+            for e in experiments
+        ]
+        fit = estimate_arx(lagged_gram(filtered, np.zeros(len(shift)), arx.max_lag), arx)
+        f = stable(fit.polynomial.a[: nf + 1, 0, 0], radius=1 - 1e-3)[0]
+        roots = sorted(np.roots(f), key=abs, reverse=True)
+        theta = []
+        for j in equation.used:
+            own = np.real(np.poly(roots[: equation.nf[j]])) if equation.nf[j] < nf else f
+            theta += [own[1:], fit.polynomial.b[equation.nk[j] : equation.nk[j] + equation.nb[j], 0, j]]
+        yield np.concatenate([*theta, np.zeros(int(equation.constant))])
+
+
+def _row(best: Minimum, equation: OutputError) -> Row:
+    names, inputs = [], equation.used
+    for j in inputs:
+        channel = f"_{j + 1}" if len(equation.nb) > 1 else ""
+        names += [f"f{k}{channel}" for k in range(1, equation.nf[j] + 1)]
+        names += [f"b{equation.nk[j] + k}{channel}" for k in range(equation.nb[j])]
+    p, hessian = len(names), best.cost.hessian
+    variance = best.cost.squares / max(equation.samples - equation.n_params, 1)
+    covariance = variance * np.linalg.pinv(hessian, hermitian=True)[:p, :p]
+    rank = int(np.linalg.matrix_rank(hessian[:p, :p], hermitian=True))
+    return Row(tuple(names), best.theta[:p], covariance, variance, rank, best.converged)
+
+
+def _assemble(
+    dt: float,
+    shift: np.ndarray,
+    orders: Orders,
+    rows: tuple[Row, ...],
+    transfers: list,
+    constants: np.ndarray,
+    samples: int,
+) -> LinearFit:
+    """One polynomial model: A is diagonal with the common denominators, and C = A."""
+    ny, nu = orders.nb.shape
+    order = max(max(len(f), *map(len, numerators.values())) for f, numerators in transfers) - 1
+    a, b = np.zeros((order + 1, ny, ny)), np.zeros((order + 1, ny, nu))
+    for i, (f, numerators) in enumerate(transfers):
+        a[: len(f), i, i] = f
+        for j, numerator in numerators.items():
+            b[: len(numerator), i, j] = numerator
+    # The constant was added to the output, so it is part of the operating point already.
+    polynomial = Polynomial(a, b, a, shift[ny:], shift[:ny] + constants, dt)
+    return LinearFit(polynomial, orders, rows, constants, samples)

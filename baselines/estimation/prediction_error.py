@@ -1,0 +1,192 @@
+"""ARMAX: A(q) y = B(q) u + C(q) e by minimising the one-step prediction error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from simgap.baselines.estimation.batches import stack
+from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names, estimate_arx
+from simgap.baselines.estimation.fitted import LinearFit, Row
+from simgap.baselines.estimation.gram import Gram, lagged_gram
+from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
+from simgap.baselines.estimation.orders import Orders
+from simgap.records import Experiment
+
+
+def estimate_armax(
+    experiments: Sequence[Experiment], shift: Float[np.ndarray, " S"], orders: Orders, constant: bool = True
+) -> LinearFit:
+    """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, from two starts, C kept stable.
+
+    Ljung 1999, sections 7.2 and 10.2. Raises UnusableInput when the experiments are too short for the order.
+    """
+    gram = lagged_gram(experiments, shift, orders.max_lag)
+    first = estimate_arx(gram, orders, constant)
+    ny = len(orders.na)
+    rows, constants, noise = [], np.zeros(ny), []
+    for i in range(ny):
+        check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
+        equation = PredictionError.of(gram, orders, i, constant)
+        start = np.concatenate((first.rows[i].values, first.constants[i : i + 1] if constant else []))
+        searches = [
+            minimise(equation.cost, theta, equation.allowed, equation.samples)
+            for theta in _starts(gram, orders, i, equation, start)
+        ]
+        best = min(searches, key=lambda search: search.cost.squares)
+        rows.append(_row(best.theta, best.cost, equation, orders, i, constant, best.converged))
+        constants[i] = best.theta[equation.linear - 1] if constant else 0.0
+        noise.append(equation.noise(best.theta))
+    return assemble(gram, orders, tuple(rows), constants, noise)
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionError:
+    """One output, y = Phi theta + C e, for each group of experiments of one length.
+
+    Only samples whose regressors are all measured are predicted. The nc samples of e before them are estimated
+    along and count in the sum of squares (Box and Jenkins 1976, section 7.1, unconditional least squares): taken as
+    zero, they cost efficiency wherever 1/C rings for long; taken as free, C is drawn to the unit circle.
+    """
+
+    u: list[Float[np.ndarray, "B T nu"]]
+    phi: list[Float[np.ndarray, "p B T"]]
+    y: list[Float[np.ndarray, "B T"]]
+    nc: int
+
+    @classmethod
+    def of(cls, gram: Gram, orders: Orders, output: int, constant: bool) -> PredictionError:
+        inputs, phi, targets = [], [], []
+        ny, lags = len(orders.na), gram.max_lag
+        for u, y in stack(gram.experiments):
+            signals = np.concatenate((y, u), axis=2) - gram.shift  # [B, T, S]
+            end = signals.shape[1]
+            columns = [
+                signals[:, lags - lag : end - lag, signal] * (-1.0 if signal < ny else 1.0)
+                for signal, lag in orders.lagged(output)
+            ]
+            inputs.append(signals[:, lags:, ny:])
+            targets.append(signals[:, lags:, output])
+            phi.append(np.stack([*columns, np.ones_like(targets[-1])] if constant else columns))
+        return cls(inputs, phi, targets, int(orders.nc[output]))
+
+    @property
+    def linear(self) -> int:
+        """How many coefficients stand before those of C."""
+        return len(self.phi[0])
+
+    @property
+    def samples(self) -> int:
+        return sum(y.size for y in self.y)
+
+    def noise(self, theta: np.ndarray) -> np.ndarray:
+        """C as a monic polynomial."""
+        return np.concatenate(([1.0], theta[self.linear :]))
+
+    def allowed(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Points with the roots of C inside the unit circle, where the predictor forgets its start."""
+        return [np.concatenate((theta[: self.linear], c[1:])) for c in stable(self.noise(theta))]
+
+    def errors(self, theta: np.ndarray) -> list[np.ndarray]:
+        """[B, nc + T]: the nc samples of e before the record that make the sum of squares smallest, then e."""
+        residuals = (
+            y - np.tensordot(theta[: self.linear], phi, 1) for phi, y in zip(self.phi, self.y, strict=True)
+        )
+        return [self._without_start(self._filtered(residual, theta), theta) for residual in residuals]
+
+    def past(self, e: np.ndarray) -> np.ndarray:
+        """[nc, B, T]: e one to nc samples ago."""
+        batch, length = e.shape[0], e.shape[1] - self.nc
+        lagged = [e[:, self.nc - k : self.nc - k + length] for k in range(1, self.nc + 1)]
+        return np.array(lagged).reshape(self.nc, batch, length)
+
+    def cost(self, theta: np.ndarray) -> Cost:
+        """|e|^2, half its gradient and J' J."""
+        return sum_up(self.linearised(theta))
+
+    def linearised(self, theta: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """e [B, nc + T] and de/dtheta [p, B, nc + T] of each group: -Phi / C and -q^-k e / C (Ljung 1999, eq. 10.53).
+
+        The start is eliminated at every point: variable projection with Kaufman's Jacobian (1975).
+        """
+        for phi, e in zip(self.phi, self.errors(theta), strict=True):
+            slope = -self._filtered(np.concatenate((phi, self.past(e))), theta)
+            yield e, self._without_start(slope, theta)
+
+    def pseudo_linear(self, errors: list[np.ndarray]) -> np.ndarray:
+        """theta by least squares on Phi and on past errors that are taken as known."""
+        p = self.linear + self.nc
+        columns = [
+            np.concatenate((phi, self.past(e))).reshape(p, -1)
+            for phi, e in zip(self.phi, errors, strict=True)
+        ]
+        target = np.concatenate([y.ravel() for y in self.y])
+        return self.allowed(np.linalg.lstsq(np.concatenate(columns, axis=1).T, target, rcond=None)[0])[0]
+
+    def _filtered(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """signals / C with nothing in the nc samples before them."""
+        before = np.zeros((*signals.shape[:-1], self.nc))
+        return np.concatenate((before, lfilter([1.0], self.noise(theta), signals)), axis=-1)
+
+    def _without_start(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Project signals [..., nc + T] off what e before the record adds: itself, and its echo through 1/C."""
+        if self.nc == 0:
+            return signals
+        c, length = self.noise(theta), signals.shape[-1]
+        impulse = np.eye(1, length - self.nc)[0]
+        start = np.eye(self.nc, length)
+        for k in range(self.nc):  # row k is a unit e, nc - k samples before the record
+            start[k, self.nc :] = lfilter(-c[self.nc - k :], c, impulse)
+        basis = np.linalg.qr(start.T)[0]  # [nc + T, nc]
+        return signals - (signals @ basis) @ basis.T
+
+
+def _starts(
+    gram: Gram, orders: Orders, output: int, equation: PredictionError, arx: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Where to begin: Hannan and Rissanen's regression on the errors of a long ARX model (1982), and plain ARX."""
+    yield np.concatenate((arx, np.zeros(equation.nc)))
+    if equation.nc == 0:
+        return
+    # Long enough for 1/C to have died out, short enough to be estimated: log(T)^1.5, about 28 of 10,000 samples.
+    shortest = min(map(len, gram.experiments))
+    length = min(orders.max_lag + int(np.log(equation.samples) ** 1.5), shortest // 4)
+    length = max(orders.max_lag, min(length, equation.samples // (4 * sum(orders.nb.shape))))
+    long = Orders.of(*orders.nb.shape, na=length, nb=length, nk=1)
+    long_fit = estimate_arx(lagged_gram(gram.experiments, gram.shift, length), long)
+    yield equation.pseudo_linear(
+        [_errors_of(long_fit, u, y, output, gram.max_lag, equation.nc) for u, y in stack(gram.experiments)]
+    )
+
+
+def _errors_of(
+    fit: LinearFit, u: np.ndarray, y: np.ndarray, output: int, skip: int, before: int
+) -> np.ndarray:
+    """[B, before + T - skip]: one-step errors of one output, zero where they are not known."""
+    model = fit.polynomial
+    e = np.zeros((y.shape[0], before + y.shape[1] - skip))
+    signals = np.concatenate((y - model.y_mean, u - model.u_mean), axis=2)
+    taps = np.concatenate((model.a, -model.b), axis=2)[:, output]  # [N1, S]
+    known = sum(lfilter(taps[:, s], [1.0], signals[:, :, s], axis=1) for s in range(signals.shape[2]))[
+        :, model.order :
+    ]
+    e[:, before + model.order - skip :] = known
+    return e
+
+
+def _row(
+    theta, cost: Cost, equation: PredictionError, orders: Orders, output: int, constant: bool, converged: bool
+) -> Row:
+    """The coefficients without the constant, which becomes part of the operating point."""
+    ny, nu = orders.nb.shape
+    names = coefficient_names(orders.lagged(output), ny, nu)
+    names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
+    variance = cost.squares / max(equation.samples - len(theta), 1)
+    covariance = variance * np.linalg.pinv(cost.hessian, hermitian=True)
+    kept = np.delete(np.arange(len(theta)), equation.linear - 1 if constant else [])
+    rank = int(np.linalg.matrix_rank(cost.hessian[np.ix_(kept, kept)], hermitian=True))
+    return Row(names, theta[kept], covariance[np.ix_(kept, kept)], variance, rank, converged)

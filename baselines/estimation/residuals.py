@@ -1,0 +1,128 @@
+"""Residual analysis: is there anything left in the errors that the past or the input explains?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from simgap.baselines.estimation.fitted import LinearFit
+from simgap.baselines.estimation.output_error import OutputError
+from simgap.baselines.estimation.prediction_error import PredictionError
+from simgap.baselines.estimation.gram import lagged_gram
+from simgap.records import Experiment
+
+# Correlations settle long before; more samples would only cost memory.
+ENOUGH_SAMPLES = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlation coefficients [L] of a residual with a signal `lags` samples ago, and their 95 % bounds [L]."""
+
+    signal: str
+    lags: Int[np.ndarray, " L"]
+    values: Float[np.ndarray, " L"]
+    bounds: Float[np.ndarray, " L"]
+
+    @property
+    def outside(self) -> Int[np.ndarray, " n"]:
+        """The lags whose correlation is more than chance; one in twenty is expected."""
+        return self.lags[np.abs(self.values) > self.bounds]
+
+    def text(self) -> str:
+        expected = 0.05 * len(self.lags)
+        found = ", ".join(map(str, self.outside[:8])) + (", .." if len(self.outside) > 8 else "")
+        return (
+            f"residual with {self.signal}: {len(self.outside)} of {len(self.lags)} lags outside the 95 % bounds "
+            f"({expected:.1f} by chance)" + (f": {found}" if found else "")
+        )
+
+
+def residual_analysis(
+    fit: LinearFit, experiments: Sequence[Experiment], max_lag: int = 25
+) -> list[list[Correlation]]:
+    """For each output: the residual with its own past, lags 1..L, then with each input, lags -L..L.
+
+    A correlation at negative lags means feedback. The bounds are 1.96 standard deviations under the hypothesis that
+    the model is right, with what the estimated parameters take away (Box and Pierce 1970) projected out,
+
+        r(tau) = z' e / (|z| |e|),   var z' e = sum_k R_e(k) R_Mz(k),   M = 1 - psi (psi' psi)^-1 psi',
+
+    for z(t) = u(t - tau) or e(t - tau) and psi the slopes of the errors (Ljung 1999, section 16.6). The plain 1/N is
+    too wide at small lags, and wrong where residual and input are both coloured.
+    """
+    return [_of_output(fit, experiments, i, max_lag) for i in range(len(fit.rows))]
+
+
+def _of_output(
+    fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int
+) -> list[Correlation]:
+    pieces = list(_aligned(fit, experiments, output, max_lag))
+    nu = fit.orders.nb.shape[1]
+    own = range(1, max_lag + 1)
+    both = range(-max_lag, max_lag + 1)
+    found = [_correlate("its own past", pieces, own, lambda e, u: e, white=True)]
+    for j in range(nu):
+        name = "the input" if nu == 1 else f"input {j + 1}"
+        found.append(_correlate(name, pieces, both, lambda e, u, j=j: u[:, j], white=False))
+    return found
+
+
+def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int) -> Iterator[tuple]:
+    """e [T], slopes [p, T] and u [T, nu] of each experiment, over the same samples."""
+    model, row = fit.polynomial, fit.rows[output]
+    shift, before = np.concatenate((model.y_mean, model.u_mean)), 0
+    if fit.orders.nf.any():
+        equation = OutputError.of(experiments, shift, fit.orders, output, True, None)
+        theta = np.concatenate((row.values, [0.0]))
+    else:
+        before = int(fit.orders.nc[output])
+        linear = len(row.values) - before
+        equation = PredictionError.of(
+            lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True
+        )
+        theta = np.insert(row.values, linear, 0.0)
+    seen = 0
+    for (e, slope), u in zip(equation.linearised(theta), equation.u, strict=True):
+        for s in range(len(e)):
+            length = e.shape[1] - before
+            if length > 4 * max_lag and seen < ENOUGH_SAMPLES:
+                kept = slice(before, before + ENOUGH_SAMPLES - seen)
+                seen += length
+                yield e[s, kept], slope[:, s, kept], u[s, u.shape[1] - length :][:ENOUGH_SAMPLES]
+
+
+def _correlate(name: str, pieces: list, lags: range, signal_of, white: bool) -> Correlation:
+    """Each piece keeps the samples for which every lag exists; pieces are summed, never glued."""
+    first, last = max(lags[-1], 0), max(-lags[0], 0)
+    errors, slopes, lagged = [], [], []
+    for e, slope, u in pieces:
+        end = len(e) - last
+        z = signal_of(e, u)
+        errors.append(e[first:end])
+        slopes.append(slope[:, first:end])
+        lagged.append(np.stack([z[first - lag : end - lag] for lag in lags]))  # [L, n]
+    e, psi, z = (np.concatenate(parts, axis=-1) for parts in (errors, slopes, lagged))
+    own = z - np.linalg.lstsq(psi.T, z.T, rcond=None)[0].T @ psi  # M z
+    norms = np.linalg.norm(z, axis=1) * np.linalg.norm(e)
+    norms[norms == 0] = 1.0
+    variance = np.sum(own**2, axis=1) * float(e @ e) / len(e)
+    if not white:
+        variance = _coloured_variance(errors, np.split(own, np.cumsum([len(x) for x in errors])[:-1], axis=1))
+    bounds = 1.96 * np.sqrt(np.maximum(variance, 0.0)) / norms
+    # A lag that the model's own regressors hold has correlation and bound zero, but for rounding.
+    return Correlation(name, np.array(lags), z @ e / norms, bounds + 1e-9)
+
+
+def _coloured_variance(errors: list[np.ndarray], own: list[np.ndarray], reach: int = 50) -> np.ndarray:
+    """sum_k R_e(k) R_z(k) over |k| <= reach, tapered (Bartlett), with R_z a sum over samples, not a mean."""
+    total = sum(map(len, errors))
+    variance = np.zeros(len(own[0]))
+    for k in range(reach + 1):
+        e_k = sum(float(e[k:] @ e[: len(e) - k]) for e in errors if len(e) > k) / total
+        z_k = sum(np.sum(z[:, k:] * z[:, : z.shape[1] - k], axis=1) for z in own if z.shape[1] > k)
+        variance += (1 if k == 0 else 2) * (1 - k / (reach + 1)) * e_k * z_k
+    return variance

@@ -1,0 +1,26 @@
+"""The mean of the training outputs: what any model must beat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.records import TrainingSet
+from simgap.registry import MODELS
+
+
+@MODELS.register("mean")
+@dataclass
+class Mean:
+    """y_hat(t) = mean of y over train and valid, whatever the input does."""
+
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        self.level = np.concatenate([e.y for e in data.train + data.valid]).mean(axis=0)  # [ny]
+        self.n_params = len(self.level)
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        return np.tile(self.level, (len(u), u.shape[1] - y_init.shape[1], 1))

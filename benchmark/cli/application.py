@@ -1,0 +1,51 @@
+"""All commands together, and what ends them: exit codes and one sentence instead of a traceback."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+import simgap
+from simgap.cli import catalogue, data, fitting, reporting, running
+from simgap.records import UnusableInput
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command("run")(running.run)
+app.command("report")(reporting.report)
+app.command("list")(catalogue.show)
+app.command("fit")(fitting.fit)
+app.add_typer(data.app, name="data")
+
+
+@app.callback(invoke_without_command=True)
+def start(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    """Classical and neural system identification on one bench, by free-run simulation."""
+    if version:
+        typer.echo(f"simgap {simgap.__version__}")
+        raise typer.Exit()
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code: 0 done, 1 a job failed, 2 unusable input, 130 interrupted."""
+    try:
+        code = app(args=arguments, prog_name="simgap", standalone_mode=False)
+    except (UnusableInput, typer.TyperException) as error:
+        return _refuse(error.format_message() if isinstance(error, typer.TyperException) else str(error))
+    except OSError as error:
+        return _refuse(f"{error.filename or 'a file'} cannot be read or written: {error.strerror or error}")
+    except (KeyboardInterrupt, typer.Abort):
+        return 130
+    return code if isinstance(code, int) else 0
+
+
+def _refuse(sentence: str) -> int:
+    print(f"simgap: {' '.join(sentence.split())}", file=sys.stderr)
+    return 2

@@ -1,0 +1,71 @@
+"""`simgap list`: what there is."""
+
+from __future__ import annotations
+
+import inspect
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from simgap.cli.options import Json, write_json
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    models = "models"
+    datasets = "datasets"
+    suites = "suites"
+
+
+def show(kind: Annotated[Kind, typer.Argument(help="What to list.")], json: Json = None) -> None:
+    """List the models, data sets or suites by name, with the reason where one cannot be used."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    entries = {Kind.models: _models, Kind.datasets: _datasets, Kind.suites: _suites}[kind]()
+    if json is not None:
+        write_json(json, entries)
+    table = Table("name", "what it is", box=box.SIMPLE_HEAD)
+    for entry in entries:
+        missing = bool(entry["missing"])
+        table.add_row(
+            Text(entry["name"], style="dim" if missing else "bold"),
+            Text(entry["missing"] or entry["title"], style="dim" if missing else ""),
+        )
+    Console().print(table)
+
+
+def _models() -> list[dict[str, str]]:
+    from simgap.registry import MODELS
+
+    entries = []
+    for name in MODELS:
+        missing = MODELS.why_missing(name)
+        entries.append(
+            {"name": name, "title": "" if missing else _first_line(MODELS[name]), "missing": missing}
+        )
+    return entries
+
+
+def _datasets() -> list[dict[str, str]]:
+    from simgap.data import available
+    from simgap.registry import DATASETS
+
+    return [
+        {"name": name, "title": "" if missing else _first_line(DATASETS[name]), "missing": missing}
+        for name, missing in available().items()
+    ]
+
+
+def _suites() -> list[dict[str, str]]:
+    from simgap.suites import load_suite, suite_names
+
+    return [{"name": name, "title": load_suite(name).title, "missing": ""} for name in suite_names()]
+
+
+def _first_line(documented: object) -> str:
+    return (inspect.getdoc(documented) or "").partition("\n")[0]

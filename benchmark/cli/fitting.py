@@ -1,0 +1,89 @@
+"""`simgap fit`: one model on one data set, here and now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, parse_params, write_json
+
+if TYPE_CHECKING:
+    import rich.console
+    import rich.table
+
+    from simgap.fitting import Fit
+    from simgap.records import Result
+
+
+def fit(
+    model: Annotated[str, typer.Argument(help="Name of a model, or path/to/file.py:Class.")],
+    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    dt: SamplingTime = None,
+    param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
+    json: Json = None,
+) -> None:
+    """Fit one model and print what it chose and how well it simulates the test experiments."""
+    from rich.console import Console
+
+    from simgap import fitting, store
+    from simgap.records import UnusableInput
+
+    params = parse_params(param or ())
+    console = Console()
+    try:
+        done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
+    except (UnusableInput, KeyboardInterrupt, OSError):
+        raise
+    except Exception as error:  # the model's own fault, told without our traceback
+        typer.echo(f"simgap: {fitting.reason('fit', error)}", err=True)
+        raise typer.Exit(1) from None
+    if json is not None:
+        write_json(json, store.encoded(done.results))
+    _print_model(console, done)
+    console.print(_scores(done.results))
+    if any(result.status == "error" for result in done.results):
+        raise typer.Exit(1)
+
+
+def _print_model(console: rich.console.Console, done: Fit) -> None:
+    first = done.results[0]
+    size = "" if first.n_params is None else f", parameters: {first.n_params}"
+    lines = [f"{first.model} on {first.dataset}: fitted in {first.fit_seconds:.3g} s{size}"]
+    if first.fitted:
+        lines.append("chosen: " + ", ".join(f"{name} = {value}" for name, value in first.fitted.items()))
+    summary = getattr(done.model, "summary", None)
+    if callable(summary):
+        lines.append(str(summary()))
+    lines += list(dict.fromkeys(f"note: {result.message}" for result in done.results if result.message))
+    for line in lines:
+        console.print(line, markup=False, highlight=False)
+
+
+def _scores(results: Sequence[Result]) -> rich.table.Table:
+    """The free-run scores per test experiment and output."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from simgap.reports.rendering import printable
+
+    table = Table(
+        "experiment", "output", title="Free-run simulation", title_justify="left", box=box.SIMPLE_HEAD
+    )
+    for heading in ("RMSE", "fit %", "samples"):
+        table.add_column(heading, justify="right")
+    for result in results:
+        if result.task != "free_run":
+            continue
+        for output, figures in result.metrics.items():
+            texts = (
+                result.experiment, output, f"{figures['rmse']:.4g} {result.units.get(output, '')}".strip(),
+                f"{figures['fit_percent']:.1f}", str(figures["n_scored"]),
+            )  # fmt: skip
+            table.add_row(*(Text(printable(text)) for text in texts))
+    return table

@@ -1,0 +1,42 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from simgap.records import UnusableInput
+
+Inputs = Annotated[list[str] | None, typer.Option("--input", help="Input column of a CSV file; repeatable.")]
+Outputs = Annotated[list[str] | None, typer.Option("--output", help="Output column; repeatable.")]
+SamplingTime = Annotated[float | None, typer.Option("--dt", help="Sampling time of a CSV file in seconds.")]
+Json = Annotated[Path | None, typer.Option("--json", help="Write the same for machines into this file.")]
+
+
+def names(text: str | None) -> list[str] | None:
+    """ "a,b" as ["a", "b"]; None stays None."""
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
+def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
+    """["na=3"] as {"na": 3}, with the types of TOML. Raises UnusableInput."""
+    params = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        if not (name.isidentifier() and equals):
+            raise UnusableInput(f"--param {pair}: write it as name=value")
+        try:
+            params[name] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            params[name] = text  # a word without quotes
+    return params
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Strict JSON, indented."""
+    path.write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,103 @@
+"""Jobs: one model, its parameters, one data set and one seed, executed in a worker process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+from simgap.fitting import build, fit_model, reason, score_model
+from simgap.metrics import failed_metrics
+from simgap.records import Channels, Dataset, Result, Status
+from simgap.store import plain
+from simgap.suites import Entry
+from simgap.tasks import TASKS
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a data set comes from: the arguments of `simgap.load`."""
+
+    data: str
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    dt: float | None = None
+
+    def load(self) -> Dataset:
+        """Raises UnusableInput."""
+        from simgap.data import load
+
+        return load(self.data, inputs=self.inputs, outputs=self.outputs, dt=self.dt)
+
+
+@dataclass(frozen=True)
+class Card:
+    """What the parent keeps of a data set, to know which results a job owes."""
+
+    name: str
+    experiments: tuple[str, ...]
+    channels: Channels
+    sha256: str
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> Card:
+        """The card of a loaded data set."""
+        return cls(dataset.name, tuple(e.name for e in dataset.test), dataset.channels, dataset.sha256)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One fit with all its simulations."""
+
+    entry: Entry
+    source: Source
+    card: Card
+    seed: int
+    tasks: tuple[str, ...]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return f"{self.entry.label} on {self.card.name}, seed {self.seed}"
+
+    @property
+    def about(self) -> Result:
+        """What all results of this job have in common."""
+        return Result(
+            model=self.entry.label, params=plain(self.entry.params), dataset=self.card.name, experiment="",
+            task="", seed=self.seed, status="ok",
+            provenance=self.provenance | {"data_sha256": self.card.sha256},
+            units={channel.name: channel.unit for channel in self.card.channels.outputs},
+        )  # fmt: skip
+
+    def owed(self) -> Iterator[Result]:
+        """The results this job owes, without their figures: one per test experiment and task."""
+        for experiment in self.card.experiments:
+            for task in self.tasks:
+                yield replace(self.about, experiment=experiment, task=task)
+
+    def failed(self, status: Status, message: str) -> list[Result]:
+        """All results of this job, saying that and why there are none."""
+        metrics = failed_metrics(self.card.channels)
+        return [replace(row, status=status, message=message, metrics=metrics) for row in self.owed()]
+
+
+def execute(job: Job) -> list[Result]:
+    """Fit and score. Whatever the model does short of ending the process becomes rows."""
+    try:
+        dataset = _load(job.source)
+    except Exception as error:  # the file may have changed since the parent read it
+        return job.failed("error", f"the data set could not be loaded again: {error}")
+    if dataset.sha256 != job.card.sha256:
+        return job.failed("error", "the data set changed while the run was under way; run again")
+    try:
+        model = build(job.entry.name, job.entry.params)
+        about = fit_model(model, dataset.training, job.about)
+    except (Exception, SystemExit) as error:  # a model may raise anything
+        return job.failed("error", reason("fit", error))
+    return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
+
+
+@lru_cache(maxsize=1)
+def _load(source: Source) -> Dataset:
+    return source.load()

@@ -1,0 +1,171 @@
+"""Results on disk: JSON lines, one file per model and suite, `<folder>/<suite>/<model>.jsonl`."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, BinaryIO, get_args
+
+from simgap.records import Result, Status, UnusableInput
+
+Key = tuple[str, str, str, str, str, int]
+
+_NUMBER = (int, float, type(None))
+_REQUIRED: dict[str, Any] = {
+    "model": str, "params": dict, "dataset": str, "experiment": str, "task": str, "seed": int, "status": str,
+}  # fmt: skip
+_OPTIONAL: dict[str, Any] = {
+    "metrics": dict, "units": dict, "fitted": dict, "n_params": (int, type(None)), "fit_seconds": _NUMBER,
+    "simulate_seconds": _NUMBER, "message": str, "provenance": dict, "schema": int,
+}  # fmt: skip
+
+
+def key(result: Result) -> Key:
+    """What a result is about: of two results with one key, the later replaces the earlier."""
+    params = json.dumps(plain(result.params), sort_keys=True)
+    return (result.model, params, result.dataset, result.experiment, result.task, result.seed)
+
+
+def path_of(folder: Path, suite: str, model: str) -> Path:
+    """The file of one model; a name becomes a file name by replacing what means something in a path."""
+    return Path(folder) / _file_name(suite) / f"{_file_name(model)}.jsonl"
+
+
+def append(folder: Path, suite: str, results: Sequence[Result]) -> None:
+    """Write the results of one job with one write per file, under a lock that other processes respect."""
+    from filelock import FileLock
+
+    by_path: dict[Path, list[Result]] = {}
+    for result in results:
+        by_path.setdefault(path_of(folder, suite, result.model), []).append(result)
+    for path, rows in by_path.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with FileLock(Path(folder) / ".lock"), path.open("a+b") as file:
+            _mend(file)
+            file.write("".join(encode(row) + "\n" for row in rows).encode())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def read(path: Path) -> list[Result]:
+    """The results of one file, or of all files of a suite's folder, without those that were replaced.
+
+    Raises UnusableInput with file and line for what is no result. An unfinished last line is no error: it is
+    what an interrupted write leaves.
+    """
+    rows: dict[Key, Result] = {}
+    for file in sorted(path.glob("*.jsonl")) if path.is_dir() else [path]:
+        *lines, last = file.read_bytes().split(b"\n")
+        if last and _is_json(last):
+            lines.append(last)
+        for number, line in enumerate(lines, start=1):
+            result = _decode(line, f"{file}, line {number}")
+            rows[key(result)] = result
+    return list(rows.values())
+
+
+def encode(result: Result) -> str:
+    """One line of strict JSON, with infinities as the strings "inf" and "-inf"."""
+    return json.dumps(plain(asdict(result)), allow_nan=False, ensure_ascii=False)
+
+
+def encoded(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """The results as JSON values, the same as in the lines of the store."""
+    return [plain(asdict(result)) for result in results]
+
+
+def plain(value: Any) -> Any:
+    """`value` in the types of JSON: arrays as lists, what is no finite number and no structure as text."""
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(name): plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple | set):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def _mend(file: BinaryIO) -> None:
+    """End an unfinished last line if it is a whole result, else cut it off."""
+    if not (size := file.seek(0, os.SEEK_END)):
+        return
+    file.seek(size - 1)
+    if file.read(1) == b"\n":
+        return
+    file.seek(0)
+    last = file.read().rpartition(b"\n")[2]
+    if _is_json(last):
+        file.write(b"\n")
+    else:
+        file.truncate(size - len(last))
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def _decode(line: bytes, where: str) -> Result:
+    try:
+        row = json.loads(line, parse_constant=_refuse)
+    except (ValueError, RecursionError) as error:  # bytes that are not UTF-8 are a ValueError too
+        raise UnusableInput(f"{where}: this is no line of results: {error}") from error
+    if not isinstance(row, dict):
+        raise UnusableInput(f"{where}: this is no line of results but a {type(row).__name__}")
+    _check_fields(row, where)
+    row["metrics"] = {name: _figures(figures, where) for name, figures in row.get("metrics", {}).items()}
+    return Result(**row)
+
+
+def _check_fields(row: dict[str, Any], where: str) -> None:
+    types = _REQUIRED | _OPTIONAL
+    for name, value in row.items():
+        if name not in types:
+            raise UnusableInput(f"{where}: unknown field {name!r}; was this written by a newer simgap?")
+        if not isinstance(value, types[name]) or isinstance(value, bool):
+            raise UnusableInput(f"{where}: {name} is a {type(value).__name__}, which it cannot be")
+    if missing := [name for name in _REQUIRED if name not in row]:
+        raise UnusableInput(f"{where}: the field {missing[0]!r} is missing")
+    if row["status"] not in get_args(Status):
+        raise UnusableInput(f"{where}: the status {row['status']!r} is none of {', '.join(get_args(Status))}")
+    if row.get("schema", 1) != 1:
+        raise UnusableInput(f"{where}: schema {row['schema']} is unknown; this simgap reads schema 1")
+
+
+def _figures(figures: Any, where: str) -> dict[str, Any]:
+    if not isinstance(figures, dict):
+        raise UnusableInput(
+            f"{where}: the metrics of an output are a {type(figures).__name__}, not figures by name"
+        )
+    decoded: dict[str, Any] = {}
+    for name, value in figures.items():
+        match value:
+            case dict():
+                decoded[name] = _figures(value, where)
+            case "inf" | "-inf":
+                decoded[name] = float(value)
+            case int() | float() if not isinstance(value, bool):
+                decoded[name] = value
+            case _:
+                raise UnusableInput(
+                    f"{where}: the metric {name!r} is {str(value)[:40]!r}, which is no number"
+                )
+    return decoded
+
+
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{constant} is not JSON; infinities are written as strings")
+
+
+def _file_name(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", name).lstrip(".") or "_"

@@ -1,0 +1,130 @@
+"""Suites: which models run on which data sets, for which tasks, how often and for how long at most."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from simgap.records import UnusableInput
+from simgap.registry import DATASETS, MODELS
+from simgap.tasks import TASKS
+
+FOLDER = Path(__file__).parent / "suites"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One model of a suite: a registered name or `file.py:Class`, its parameters, its name in the results."""
+
+    name: str
+    params: dict[str, Any] = field(default_factory=dict)
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.label:
+            object.__setattr__(self, "label", self.name.rpartition(":")[2])
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What `simgap run` does unless told otherwise; timeout in seconds per fit with its simulations."""
+
+    name: str
+    title: str
+    datasets: tuple[str, ...]
+    models: tuple[Entry, ...]
+    tasks: tuple[str, ...] = tuple(TASKS)
+    seeds: int = 1
+    timeout: float = 3600.0
+
+
+def suite_names() -> list[str]:
+    """The suites that come with simgap."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load_suite(name: str) -> Suite:
+    """The suite called `name`, or the one in the TOML file at that path.
+
+    Paths inside a suite file count from where the file lies. Raises UnusableInput.
+    """
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    if not path.is_file():
+        known = ", ".join(suite_names())
+        raise UnusableInput(
+            f"there is no suite {name!r}; known are {known}, or give the path of a .toml file"
+        )
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:  # no TOML, or no UTF-8
+        raise UnusableInput(f"{path}: {error}") from error
+    return _Reader(path, table).suite()
+
+
+@dataclass(frozen=True)
+class _Reader:
+    path: Path
+    table: dict[str, Any]
+
+    def suite(self) -> Suite:
+        self._refuse_unknown(self.table, ("title", "datasets", "models", "tasks", "seeds", "timeout"))
+        suite = Suite(
+            name=self.path.stem,
+            title=self._get("title", str, self.path.stem),
+            datasets=self._datasets(),
+            models=tuple(self._models()),
+            tasks=tuple(str(task) for task in self._get("tasks", list, list(TASKS))),
+            seeds=self._get("seeds", int, 1),
+            timeout=float(self._get("timeout", (int, float), 3600)),
+        )
+        for task in suite.tasks:
+            if task not in TASKS:
+                raise UnusableInput(f"{self.path}: there is no task {task!r}; known are {', '.join(TASKS)}")
+        if suite.seeds < 1 or not suite.timeout > 0:
+            raise UnusableInput(f"{self.path}: seeds and timeout must be positive")
+        return suite
+
+    def _datasets(self) -> tuple[str, ...]:
+        given = self._get("datasets", (list, str), "all")
+        if given == "all":
+            return tuple(DATASETS)
+        if isinstance(given, str) or not all(isinstance(name, str) for name in given):
+            raise UnusableInput(f'{self.path}: datasets must be "all" or a list of names')
+        return tuple(name if name in DATASETS else self._near(name) for name in given)
+
+    def _models(self) -> Iterable[Entry]:
+        given = self._get("models", (list, str), "all")
+        tables = [{"name": "all"}] if given == "all" else given
+        if isinstance(tables, str) or not all(isinstance(table, dict) for table in tables):
+            raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
+        for table in tables:
+            self._refuse_unknown(table, ("name", "params", "label"))
+            entry = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
+            if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
+                raise UnusableInput(f"{self.path}: a model needs a name, a table params and a text as label")
+            if entry[0] == "all":
+                yield from (Entry(name) for name in MODELS)
+            else:
+                yield Entry(self._near(entry[0]) if ".py:" in entry[0] else entry[0], *entry[1:])
+
+    def _near(self, name: str) -> str:
+        """`name`, a path or `file.py:Class`, from the suite's own folder if there is such a file."""
+        near = self.path.parent / name
+        file = Path(str(near).rpartition(":")[0]) if ".py:" in name else near
+        return str(near) if file.exists() else name
+
+    def _get(self, name: str, kind: Any, default: Any) -> Any:
+        value = self.table.get(name, default)
+        if value == []:
+            raise UnusableInput(f"{self.path}: the list of {name} is empty")
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise UnusableInput(f"{self.path}: {name} is {value!r}, which is of the wrong type")
+        return value
+
+    def _refuse_unknown(self, table: dict[str, Any], known: tuple[str, ...]) -> None:
+        for name in table:
+            if name not in known:
+                raise UnusableInput(f"{self.path}: unknown key {name!r}; known are {', '.join(known)}")

@@ -1,0 +1,66 @@
+"""Splits in time, never glued and never shuffled, and the checks that every data set passes on the way in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from simgap.records import Channels, Dataset, Experiment, TrainingSet, UnusableInput
+
+Experiments = tuple[Experiment, ...]
+
+LARGEST_DEFAULT_N_INIT = 20
+
+
+def split_in_time(record: Experiment) -> tuple[Experiments, Experiments, Experiments]:
+    """The first 60 % of the record to train on, then 20 % to validate on, then 20 % to test on."""
+    a, b = len(record) * 3 // 5, len(record) * 4 // 5
+    train, valid, test = record[:a], record[a:b], record[b:]
+    return (replace(train, name="train"),), (replace(valid, name="valid"),), (replace(test, name="test"),)
+
+
+def hold_out_tails(records: Sequence[Experiment]) -> tuple[Experiments, Experiments]:
+    """Each record without its last quarter, and the last quarters as experiments of their own."""
+    cuts = [len(record) - len(record) // 4 for record in records]
+    heads = tuple(record[:cut] for record, cut in zip(records, cuts, strict=True))
+    tails = tuple(
+        replace(record[cut:], name=f"{record.name}_tail") for record, cut in zip(records, cuts, strict=True)
+    )
+    return heads, tails
+
+
+def default_n_init(records: Sequence[Experiment]) -> int:
+    """A tenth of the shortest experiment, at least 1 and at most 20 samples."""
+    return min(LARGEST_DEFAULT_N_INIT, max(1, min(map(len, records)) // 10))
+
+
+def assemble(
+    name: str,
+    splits: tuple[Sequence[Experiment], Sequence[Experiment], Sequence[Experiment]],
+    channels: Channels,
+    n_init: int | None,
+    source: str,
+) -> Dataset:
+    """A data set of training, validation and test experiments; `source` names it in the messages.
+
+    Raises UnusableInput when an experiment is not longer than n_init or an input never moves in training.
+    """
+    train, valid, test = map(tuple, splits)
+    every = train + valid + test
+    n_init = default_n_init(every) if n_init is None else n_init
+    for experiment in every:
+        if len(experiment) <= n_init:
+            raise UnusableInput(
+                f"{source}: experiment {experiment.name} has {len(experiment)} rows, no more than the "
+                f"{n_init} (n_init) that start a simulation; record longer experiments or lower n_init"
+            )
+    for column, channel in enumerate(channels.inputs):
+        values = np.concatenate([experiment.u[:, column] for experiment in train])
+        if values.min() == values.max():
+            raise UnusableInput(
+                f"{source}: input column {channel.name!r} is {values[0]} in all {len(values)} rows of the "
+                f"training split; leave it out of the inputs or record it while it moves"
+            )
+    return Dataset(name, TrainingSet(train, valid, n_init, channels), test, n_init, channels)

@@ -1,0 +1,69 @@
+"""The leaderboard: stored results as one Markdown page and one CSV file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from simgap import store
+from simgap.records import Result, UnusableInput
+from simgap.reports.published import published_markdown
+from simgap.reports.rendering import escape, to_markdown
+from simgap.reports.tables import Table, dataset_table, overview, tidy
+
+_HOW_TO_READ = (
+    "Every model is simulated over the whole test record from its first measured outputs alone (free run). "
+    "Fit is 100 (1 - RMSE / standard deviation), pooled over test experiments and outputs; the best of a "
+    "column is bold. 'k ahead' is the RMSE of a forecast k samples after the last measured output it uses. "
+    "With several seeds: median (range)."
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """The tables of each suite, and the files they were written to."""
+
+    tables: dict[str, list[Table]]
+    markdown: Path
+    csv: Path
+
+
+def report(folder: str | Path = "results") -> Report:
+    """Write `leaderboard.md` and `results.csv` into a folder of results, or into the folder of one suite.
+
+    Raises UnusableInput when there are no results or a file is damaged.
+    """
+    folder = Path(folder)
+    suites = _read(folder)
+    tables = {suite: tables_of(results) for suite, results in suites.items()}
+    markdown, csv = folder / "leaderboard.md", folder / "results.csv"
+    markdown.write_text(_page(tables), encoding="utf-8")
+    frames = [tidy(results).assign(suite=suite) for suite, results in suites.items()]
+    pd.concat(frames).to_csv(csv, index=False)
+    return Report(tables, markdown, csv)
+
+
+def tables_of(results: list[Result]) -> list[Table]:
+    """The overview, then each data set's table."""
+    datasets = sorted({result.dataset for result in results})
+    return [overview(results), *(dataset_table(results, dataset) for dataset in datasets)]
+
+
+def _read(folder: Path) -> dict[str, list[Result]]:
+    if not folder.is_dir():
+        raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one")
+    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    suites = {path.resolve().name: rows for path in folders if (rows := store.read(path))}
+    if not suites:
+        raise UnusableInput(f"{folder} holds no results; `simgap run` makes them")
+    return suites
+
+
+def _page(tables: dict[str, list[Table]]) -> str:
+    parts = ["# Leaderboard\n", _HOW_TO_READ + "\n"]
+    for suite, listed in tables.items():
+        parts.append(f"## Suite {escape(suite)}\n")
+        parts += [to_markdown(table, level=3) for table in listed]
+    return "\n".join([*parts, published_markdown()])

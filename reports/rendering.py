@@ -1,0 +1,72 @@
+"""Tables for the terminal and as Markdown. Names from data sets are shown, never interpreted."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from simgap.reports.tables import Table
+
+if TYPE_CHECKING:
+    import rich.console
+
+LEFT = ("model", "status")  # columns of words
+WIDEST_WORD = 18  # of a heading on a terminal, where longer ones are broken
+
+
+def to_rich(table: Table, width: int = 120) -> rich.console.Group:
+    """The table for a terminal `width` characters wide, the best of a column in bold, footnotes below.
+
+    Headings wrap, numbers never: the last columns are left out, and named, where the width does not suffice.
+    """
+    from rich import box
+    from rich.console import Group
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    widths = [_width(table, i) for i in range(len(table.columns))]
+    shown = max((n for n in range(len(widths) + 1) if sum(widths[:n]) + 2 * n < width), default=0)
+    drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    for column, column_width in zip(table.columns[:shown], widths, strict=False):
+        heading = Text(printable(column), overflow="fold")
+        drawn.add_column(heading, justify="left" if column in LEFT else "right", width=column_width)
+    for row in table.rows:
+        drawn.add_row(*(Text(printable(c.text), style="bold" if c.best else "") for c in row[:shown]))
+    notes = _numbered(table)
+    if shown < len(widths):
+        notes.append(f"Not shown on this narrow terminal: {printable(', '.join(table.columns[shown:]))}")
+    return Group(Text(printable(table.title), style="bold"), drawn, *map(Text, notes), Text())
+
+
+def _width(table: Table, column: int) -> int:
+    """Characters that a column takes: its longest entry, or the longest word of its heading."""
+    word = max(map(len, table.columns[column].split()), default=0)
+    return max(min(word, WIDEST_WORD), *(len(row[column].text) for row in table.rows), 1)
+
+
+def to_markdown(table: Table, level: int = 2) -> str:
+    """The table as Markdown under a heading of that level."""
+    lines = [f"{'#' * level} {escape(table.title)}", ""]
+    lines.append("| " + " | ".join(escape(column) for column in table.columns) + " |")
+    lines.append("|" + "".join("---|" if column in LEFT else "--:|" for column in table.columns))
+    for row in table.rows:
+        cells = [f"**{escape(cell.text)}**" if cell.best else escape(cell.text) for cell in row]
+        lines.append("| " + " | ".join(cells) + " |")
+    for note in _numbered(table):
+        lines += ["", escape(note)]
+    return "\n".join(lines) + "\n"
+
+
+def escape(text: str) -> str:
+    """`text` so that Markdown and HTML show it as it is, on one line."""
+    text = printable(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return re.sub(r"([\\`*_{}\[\]|#~$!])", r"\\\1", text)
+
+
+def printable(text: str) -> str:
+    """`text` without line breaks and without what a terminal would obey."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _numbered(table: Table) -> list[str]:
+    return [f"[{number}] {printable(note)}" for number, note in enumerate(table.notes, start=1)]

@@ -1,0 +1,200 @@
+"""Results as tables: an overview of all models on all data sets, and one table per data set."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+from simgap.records import Result
+from simgap.reports.pooling import Spread, Standing, standings
+from simgap.store import plain
+
+# More test experiments than these are pooled into one column.
+COLUMNS_PER_EXPERIMENT = 4
+HORIZONS = ("1", "10", "50")
+FIGURES = ("rmse", "nrmse", "fit_percent", "r2", "mse", "mae", "std", "n_scored")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One entry: its text, and the number by which the best entry of a column is found."""
+
+    text: str
+    value: float | None = None
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """What is rendered for the terminal and as Markdown. Every text may come from a stranger's data set."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[Cell]]
+    notes: list[str] = field(default_factory=list)
+
+
+def tidy(results: Sequence[Result]) -> pd.DataFrame:
+    """One row per result and output, one column per figure; horizons as rmse_1, rmse_2, ... rmse_all."""
+    rows = []
+    for result in results:
+        about = {
+            "model": result.model, "params": json.dumps(plain(result.params), sort_keys=True),
+            "dataset": result.dataset, "experiment": result.experiment, "task": result.task,
+            "seed": result.seed, "status": result.status,
+        }  # fmt: skip
+        last = {
+            "n_params": result.n_params, "fit_seconds": result.fit_seconds,
+            "simulate_seconds": result.simulate_seconds, "message": result.message,
+        }  # fmt: skip
+        for output, figures in result.metrics.items():
+            ahead = {f"rmse_{h}": rmse for h, rmse in figures.get("rmse_by_horizon", {}).items()}
+            single = {name: figures.get(name) for name in FIGURES}
+            unit = result.units.get(output, "")
+            rows.append(about | {"output": output, "unit": unit} | single | ahead | last)
+    return pd.DataFrame(rows)
+
+
+def overview(results: Sequence[Result]) -> Table:
+    """Fit in percent of the free run: models down, data sets across, the best model first."""
+    found = standings(results)
+    datasets = sorted({standing.dataset for standing in found})
+    notes = _Notes()
+    rows = []
+    for model in dict.fromkeys(s.model for s in found):
+        mine = {s.dataset: s for s in found if s.model == model}
+        cells = [_fit_cell(mine[name], notes) if name in mine else Cell("") for name in datasets]
+        rows.append([Cell(model), *cells])
+    rows.sort(key=lambda row: sum(_or_worst(cell.value) for cell in row[1:]), reverse=True)
+    for column in range(1, len(datasets) + 1):
+        _mark_best(rows, column, max)
+    return Table("Free-run fit in percent", ["model", *datasets], rows, notes.texts)
+
+
+def dataset_table(results: Sequence[Result], dataset: str) -> Table:
+    """RMSE, fit, RMSE by horizon, size and time of all models on one data set, the best model first."""
+    found = [standing for standing in standings(results) if standing.dataset == dataset]
+    rows_of = [row for standing in found for row in standing.rows]
+    experiments = list(dict.fromkeys(row.experiment for row in rows_of))
+    units = {output: row.units.get(output, "") for row in rows_of for output in row.metrics}
+    groups = [[e] for e in experiments] if 1 < len(experiments) <= COLUMNS_PER_EXPERIMENT else [experiments]
+    horizons = _horizons(rows_of)
+
+    columns = ["model", "status"]
+    for group in groups:
+        columns += [_heading(output, unit, group, len(groups)) for output, unit in units.items()]
+    columns.append("fit %")
+    if horizons:
+        steps = "/".join(horizons)
+        columns += [_with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
+    columns += ["parameters", "fit s"]
+
+    notes = _Notes()
+    found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
+    rows = []
+    for standing in found:
+        errors = [
+            _cell(standing.rmse(output, group), ".4g", standing.failed)
+            for group in groups
+            for output in units
+        ]
+        ahead = [_ahead(standing, output, horizons) for output in units if horizons]
+        size, seconds = standing.n_params(), standing.seconds()
+        rows.append([
+            Cell(standing.model), Cell(_status(standing) + notes.of(standing)),
+            *errors, _cell(standing.fit_percent(), "z.1f", standing.failed), *ahead,
+            Cell("" if size is None else str(size)), Cell("" if seconds is None else f"{seconds:.2g}"),
+        ])  # fmt: skip
+    n_errors = len(groups) * len(units)
+    for column in range(2, n_errors + 2):
+        _mark_best(rows, column, min)
+    _mark_best(rows, n_errors + 2, max)
+    if len({row.provenance.get("data_sha256") for row in rows_of}) > 1:
+        notes.texts.append("These rows come from different versions of the data set; run the suite again.")
+    return Table(dataset, columns, rows, notes.texts)
+
+
+class _Notes:
+    """Footnotes of one table, numbered as they come; one text has one number."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def of(self, standing: Standing) -> str:
+        """The marks of all problems of a standing, such as " [1] [2]"."""
+        marks = ""
+        for status, message in standing.problems():
+            text = message if status == "ok" else f"{status}: {message}"
+            if text not in self.texts:
+                self.texts.append(text)
+            marks += f" [{self.texts.index(text) + 1}]"
+        return marks
+
+
+def _cell(spread: Spread | None, form: str, failed: bool) -> Cell:
+    if spread is None:
+        return Cell("")
+    if failed and math.isinf(spread.median):
+        return Cell("-", spread.median)
+    text = format(spread.median, form)
+    if spread.low != spread.high:
+        text += f" ({spread.low:{form}} to {spread.high:{form}})"
+    return Cell(text, spread.median)
+
+
+def _fit_cell(standing: Standing, notes: _Notes) -> Cell:
+    cell = _cell(standing.fit_percent(), "z.1f", standing.failed)
+    text = _status(standing) if cell.text == "-" else cell.text
+    return replace(cell, text=text + notes.of(standing))
+
+
+def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:
+    medians = [_median(standing.rmse_at(output, horizon)) for horizon in horizons]
+    if medians == [None] * len(medians):
+        return Cell("")
+    if standing.failed and math.inf in medians:
+        return Cell("-")
+    return Cell("/".join("" if value is None else f"{value:.3g}" for value in medians))
+
+
+def _status(standing: Standing) -> str:
+    counts = {status: 0 for status in ("ok", "diverged", "error", "timeout")}
+    for row in standing.rows:
+        counts[row.status] += 1
+    present = [status for status, count in counts.items() if count]
+    return present[0] if len(present) == 1 else ", ".join(f"{counts[status]} {status}" for status in present)
+
+
+def _mark_best(rows: list[list[Cell]], column: int, best_of: Callable[[list[float]], float]) -> None:
+    values = [row[column].value for row in rows]
+    finite = [value for value in values if value is not None and math.isfinite(value)]
+    for row in rows:
+        if finite and row[column].value == best_of(finite):
+            row[column] = replace(row[column], best=True)
+
+
+def _horizons(rows: Sequence[Result]) -> list[str]:
+    present = {
+        h for row in rows for figures in row.metrics.values() for h in figures.get("rmse_by_horizon", {})
+    }
+    return [horizon for horizon in HORIZONS if horizon in present]
+
+
+def _heading(output: str, unit: str, experiments: Sequence[str], n_groups: int) -> str:
+    return _with_unit(f"RMSE {output} {experiments[0]}" if n_groups > 1 else f"RMSE {output}", unit)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _median(spread: Spread | None) -> float | None:
+    return None if spread is None else spread.median
+
+
+def _or_worst(value: float | None) -> float:
+    return -math.inf if value is None or not math.isfinite(value) else value

@@ -1,0 +1,140 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+from simgap.cli import main
+
+
+def run(capsys, *arguments):
+    """Exit code, standard output and standard error of one command."""
+    code = main([str(argument) for argument in arguments])
+    printed = capsys.readouterr()
+    return code, printed.out, printed.err
+
+
+def test_simgap_alone_prints_its_help(capsys):
+    code, out, err = run(capsys)
+    assert (code, err) == (0, "")
+    assert all(command in out for command in ("run", "report", "list", "fit", "data"))
+
+
+def test_the_version_is_printed(capsys):
+    assert run(capsys, "--version") == (0, "simgap 0.1.0\n", "")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "nosuch", "--nosuch", "run --nosuch", "run --jobs many", "run --jobs 0", "run nosuch",
+        "run --engine ray", "run --models nosuch", "run --model nosuch.py:A", "run --model nosuch",
+        "run --datasets nosuch", "list", "list nosuch", "fit", "fit nosuch gimbal", "fit mean",
+        "fit mean nosuch", "fit mean gimbal --param na", "fit mean gimbal --param =3", "report nosuch",
+        "data", "data nosuch", "data make", "data make nosuch", "data fetch nosuch", "data check nosuch",
+    ],
+)  # fmt: skip
+def test_unusable_arguments_end_with_code_2_and_one_sentence(capsys, command):
+    code, out, err = run(capsys, *command.split())
+    assert (code, out) == (2, "")
+    assert err.startswith("simgap: ")
+    assert err.count("\n") == 1
+
+
+def test_unusable_arguments_leave_no_traceback_in_a_real_process():
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from simgap.cli import main; sys.exit(main())",
+        "run",
+        "--nosuch",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("simgap: No such option: --nosuch")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("kind", ["models", "datasets", "suites"])
+def test_lists_are_printed_and_written_for_machines(capsys, tmp_path, kind):
+    code, out, err = run(capsys, "list", kind, "--json", tmp_path / "list.json")
+    assert (code, err) == (0, "")
+    for entry in json.loads((tmp_path / "list.json").read_text()):
+        assert set(entry) == {"name", "title", "missing"}
+        assert entry["name"] in out
+
+
+def test_run_shows_each_job_and_the_overview_and_writes_json(capsys, tmp_path, suite):
+    code, out, err = run(
+        capsys, "run", suite("Mean", "IsNaN"), "--out", tmp_path / "out", "--json", tmp_path / "j"
+    )
+    assert (code, err) == (0, "")
+    assert "[1/2] Mean on noise, seed 0: fitted in" in out
+    assert "Free-run fit in percent" in out
+    rows = json.loads((tmp_path / "j").read_text())
+    assert len(rows) == 8
+    assert rows[-1]["metrics"]["phi"]["rmse"] == "inf"
+
+
+def test_run_ends_with_code_1_when_a_job_failed(capsys, tmp_path, suite):
+    code, out, _ = run(capsys, "run", suite("Mean", "RaisesInFit"), "--out", tmp_path / "out")
+    assert code == 1
+    assert "RaisesInFit on noise, seed 0: error, fit raised RuntimeError: no luck today" in out
+
+
+def test_report_shows_the_tables_and_writes_the_files(capsys, tmp_path, suite):
+    run(capsys, "run", suite("Mean"), "--out", tmp_path / "out")
+    code, out, err = run(capsys, "report", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "Free-run fit in percent" in out
+    assert (tmp_path / "out" / "leaderboard.md").exists()
+    assert (tmp_path / "out" / "results.csv").exists()
+
+
+def test_fit_prints_what_was_chosen_the_summary_and_scores_with_units(capsys, tmp_path, folder, example):
+    code, out, _ = run(
+        capsys,
+        "fit",
+        example("Scaled"),
+        folder,
+        "--param",
+        "factor=2",
+        "--seed",
+        3,
+        "--json",
+        tmp_path / "f.json",
+    )
+    assert code == 0
+    assert "Scaled on noise: fitted in" in out
+    assert "seed = 3" in out
+    assert "always the mean" in out
+    assert "deg/s" in out
+    row = json.loads((tmp_path / "f.json").read_text())[0]
+    assert (row["params"], row["seed"]) == ({"factor": 2}, 3)
+
+
+def test_fit_prints_warnings_as_notes(capsys, folder, example):
+    assert "note: RuntimeWarning: badly conditioned" in run(capsys, "fit", example("Warns"), folder)[1]
+
+
+@pytest.mark.parametrize("model", ["RaisesInFit", "RaisesInSimulate"])
+def test_fit_ends_with_code_1_when_the_model_fails(capsys, folder, example, model):
+    code, out, err = run(capsys, "fit", example(model), folder)
+    assert code == 1
+    assert "raised" in out + err
+    assert "Traceback" not in out + err
+
+
+def test_data_check_says_what_a_folder_holds(capsys, folder):
+    code, out, _ = run(capsys, "data", "check", folder)
+    assert code == 0
+    assert "noise: usable, sampled every 0.1 s" in out
+    assert "test   2 experiments, 150 samples" in out
+    assert "output phi" in out
+
+
+def test_parameters_are_read_as_in_a_suite():
+    from simgap.cli.options import parse_params
+
+    given = ["a=3", "b=1e-3", "c=word", 'd="4"', "e=true", "f=[1, 2]", "g="]
+    assert parse_params(given) == {"a": 3, "b": 1e-3, "c": "word", "d": "4", "e": True, "f": [1, 2], "g": ""}
