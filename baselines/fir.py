@@ -34,4 +34,4 @@ class Fir(LinearModel):
 
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:
         gram = lagged_gram(experiments, rough_means(experiments, self.offset), max_lag)
-        return lambda orders: estimate_arx(gram, orders, self.offset)
+        return lambda orders, start: estimate_arx(gram, orders, self.offset)

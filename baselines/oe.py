@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, require_both
 from simgap.baselines.estimation.orders import Order, Orders
@@ -46,4 +47,9 @@ class Oe(LinearModel):
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:
         shift = rough_means(experiments, self.offset)
         n_start = n_init if self.start == "n_init" else None
-        return lambda orders: estimate_oe(experiments, shift, orders, self.offset, n_start)
+
+        def estimate(orders: Orders, start: LinearFit | None) -> LinearFit:
+            around = start.operating_point if start else shift
+            return estimate_oe(experiments, around, orders, self.offset, n_start, start)
+
+        return estimate

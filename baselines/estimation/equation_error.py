@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simgap.baselines.estimation.fitted import LinearFit, Row, operating_point
+from simgap.baselines.estimation.fitted import LinearFit, Row, moved_operating_point
 from simgap.baselines.estimation.gram import Gram
 from simgap.baselines.estimation.least_squares import solve
 from simgap.baselines.estimation.orders import Orders
@@ -55,7 +55,7 @@ def assemble(
             else:
                 b[lag, i, signal - ny] = value
         c[: len(noise[i]), i, i] = noise[i]
-    y_mean, u_mean = operating_point(a, b, constants, gram.experiments, gram.shift)
+    y_mean, u_mean = moved_operating_point(a, b, constants, gram.experiments, gram.shift)
     polynomial = Polynomial(a, b, c, u_mean, y_mean, gram.experiments[0].dt)
     return LinearFit(polynomial, orders, rows, constants, gram.rows)
 

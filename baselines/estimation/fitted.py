@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.gram import thin_sample
+from simgap.baselines.estimation.levenberg import Minimum
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.records import Experiment
@@ -30,6 +31,21 @@ class Row:
     rank: int
     converged: bool = True
 
+    @classmethod
+    def at(cls, minimum: Minimum, names: Sequence[str], kept: Sequence[int], samples: int) -> Row:
+        """The coefficients `kept` of a least-squares minimum, with covariance variance * (J' J)^-1."""
+        cost, theta = minimum.cost, minimum.theta
+        variance = cost.squares / max(samples - len(theta), 1)
+        scale = np.sqrt(np.diag(cost.hessian))
+        scale[scale == 0] = 1.0
+        values, vectors = np.linalg.eigh(cost.hessian / scale / scale[:, None])
+        known = values > len(theta) * 1e-14 * values[-1]  # what is less is rounding of J' J
+        inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / scale / scale[:, None]
+        covariance = (variance * inverse)[np.ix_(kept, kept)]
+        # A constant that cannot be told from the start state is no reason to doubt the coefficients.
+        rank = len(kept) - max(0, int((~known).sum()) - (len(theta) - len(kept)))
+        return cls(tuple(names), theta[kept], covariance, variance, rank, minimum.converged)
+
     @property
     def standard_errors(self) -> Float[np.ndarray, " p"]:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
@@ -47,6 +63,11 @@ class LinearFit:
     rows: tuple[Row, ...]
     constants: Float[np.ndarray, " ny"]
     samples: int
+
+    @property
+    def operating_point(self) -> Float[np.ndarray, " S"]:
+        """The levels of outputs, then inputs, around which the model has no constant."""
+        return np.concatenate((self.polynomial.y_mean, self.polynomial.u_mean))
 
     @property
     def n_params(self) -> int:
@@ -69,8 +90,8 @@ class LinearFit:
         for row in self.rows:
             if row.rank < len(row.values):
                 warnings.warn(
-                    f"the data do not excite the model: only {row.rank} of {len(row.values)} regressors are "
-                    f"independent, so the coefficients are not unique; lower the order or use a richer input",
+                    f"only {row.rank} of {len(row.values)} coefficients can be told apart: the input does not excite "
+                    f"the rest, or the order is higher than the data ask for; lower it or use a richer input",
                     IdentificationWarning,
                     stacklevel=2,
                 )
@@ -96,7 +117,7 @@ class LinearFit:
         return "\n".join(lines)
 
 
-def operating_point(
+def moved_operating_point(
     a: Float[np.ndarray, "N1 ny ny"],
     b: Float[np.ndarray, "N1 ny nu"],
     constant: Float[np.ndarray, " ny"],

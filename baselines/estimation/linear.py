@@ -17,7 +17,8 @@ from simgap.baselines.estimation.residuals import residual_analysis
 from simgap.records import Experiment, TrainingSet, UnusableInput
 
 Criterion = Literal["valid", "aic", "bic"]
-Estimator = Callable[[Orders], LinearFit]
+# From orders, and a fit to begin the search at where there is one, to a fit.
+Estimator = Callable[[Orders, LinearFit | None], LinearFit]
 
 
 class LinearModel(ABC):
@@ -48,11 +49,11 @@ class LinearModel(ABC):
         The estimate has no randomness, so the seed changes nothing.
         """
         ny, nu = len(data.channels.outputs), len(data.channels.inputs)
-        orders = self.given_orders(ny, nu)
+        orders, start = self.given_orders(ny, nu), None
         if orders is None:
-            orders = self._selected(data, self.candidates(ny, nu))
+            orders, start = self._selected(data, self.candidates(ny, nu))
         everything = data.train + data.valid
-        self.result = self.estimator(everything, data.n_init, orders.max_lag)(orders)
+        self.result = self.estimator(everything, data.n_init, orders.max_lag)(orders, start)
         self._seen = everything
         self.result.warn()
 
@@ -84,47 +85,73 @@ class LinearModel(ABC):
         lines = [f"output {i + 1}: {found.text()}" for i, row in enumerate(tests) for found in row]
         return "\n".join((self.result.table(), f"poles of the simulation: {poles}", *lines))
 
-    def _selected(self, data: TrainingSet, candidates: list[Orders]) -> Orders:
-        """The candidate with the best free run on valid, or the least AIC or BIC on everything."""
+    def _selected(self, data: TrainingSet, candidates: list[Orders]) -> tuple[Orders, LinearFit]:
+        """The chosen candidate and its fit, at which the final estimation begins.
+
+        So the model that is refined is the one that was chosen, and no other minimum of the same order.
+        """
         valid = [e for e in data.valid if len(e) > data.n_init]
         by_simulation = self.select == "valid" and bool(valid)
         experiments = data.train if by_simulation else data.train + data.valid
+        fits = self._fits(experiments, data.n_init, candidates)
+        if by_simulation:
+            chosen = simplest_of_the_best(fits, valid, data.n_init)
+        else:
+            penalty = 2.0 if self.select == "aic" else float(np.log(fits[0].samples))
+            chosen = min(fits, key=lambda fit: fit.criterion(penalty))
+        return chosen.orders, chosen
+
+    def _fits(
+        self, experiments: Sequence[Experiment], n_init: int, candidates: list[Orders]
+    ) -> list[LinearFit]:
         longest = max(map(len, experiments))
-        candidates = [orders for orders in candidates if orders.max_lag < longest // 4]
-        if not candidates:
-            raise UnusableInput(
-                f"too few samples to select an order: the longest training experiment has {longest}; record more"
-            )
-        estimate = self.estimator(experiments, data.n_init, max(orders.max_lag for orders in candidates))
-        scores = []
-        for orders in candidates:
+        short_enough = [orders for orders in candidates if orders.max_lag < longest // 4]
+        estimate = self.estimator(experiments, n_init, max((o.max_lag for o in short_enough), default=0))
+        fits = []
+        for orders in short_enough:
             try:
-                fit = estimate(orders)
+                fits.append(estimate(orders, None))
             except UnusableInput:  # too few samples for this one
-                scores.append(np.inf)
                 continue
-            if by_simulation:
-                scores.append(free_run_error(fit.polynomial, valid, data.n_init))
-            else:
-                scores.append(fit.criterion(2.0 if self.select == "aic" else float(np.log(fit.samples))))
-        if not np.isfinite(scores).any():
+        if not fits:
             raise UnusableInput(
-                "no order could be estimated from so few samples; record more or give a lower order"
+                f"too few samples to select an order: the longest training experiment has {longest}; "
+                f"record more, or give a low order"
             )
-        return candidates[int(np.argmin(scores))]
+        return fits
 
 
-def free_run_error(model: Polynomial, experiments: Sequence[Experiment], n_init: int) -> float:
-    """Mean over the outputs of mse / variance, over all experiments; infinite when the run diverges."""
-    squares, spread = 0.0, 0.0
-    measured = np.concatenate([e.y[n_init:] for e in experiments])
+def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_init: int) -> LinearFit:
+    """The fit with the fewest coefficients whose free run is no worse than the best by more than chance.
+
+    Chance is one standard error of the difference over pieces of the validation data (Breiman, Friedman, Olshen and
+    Stone 1984, section 3.4.3, on paired differences).
+    """
+    errors = np.array([free_run_errors(fit.polynomial, valid, n_init) for fit in fits])  # [F, K]
+    best = int(np.argmin(errors.mean(axis=1)))
+    if not np.isfinite(errors[best]).all():
+        return min(fits, key=lambda fit: fit.n_params)
+    with np.errstate(over="ignore", invalid="ignore"):  # a fit that diverged has huge or infinite errors
+        worse = errors - errors[best]
+        chance = worse.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])
+        as_good = worse.mean(axis=1) <= np.nan_to_num(chance)
+    return min((fit for fit, good in zip(fits, as_good, strict=True) if good), key=lambda fit: fit.n_params)
+
+
+def free_run_errors(
+    model: Polynomial, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
+) -> Float[np.ndarray, " K"]:
+    """Mean over the outputs of mse / variance, in at least `pieces` pieces of all experiments; inf where it diverges."""
+    spread = np.concatenate([e.y[n_init:] for e in experiments]).var(axis=0)
+    spread[spread == 0] = 1.0
+    each = -(-pieces // len(experiments))
+    errors = []
     with np.errstate(over="ignore", invalid="ignore"):
         for u, y in stack(experiments):
-            error = model.simulate(u, y[:, :n_init]) - y[:, n_init:]
-            squares = squares + np.sum(error**2, axis=(0, 1))
-    spread = np.sum((measured - measured.mean(axis=0)) ** 2, axis=0)
-    score = float(np.mean(squares / np.where(spread > 0, spread, 1.0)))
-    return score if np.isfinite(score) else np.inf
+            squares = (model.simulate(u, y[:, :n_init]) - y[:, n_init:]) ** 2 / spread  # [B, T-n, ny]
+            for piece in np.array_split(squares.mean(axis=2), min(each, squares.shape[1]), axis=1):
+                errors.extend(piece.mean(axis=1))
+    return np.where(np.isfinite(errors), errors, np.inf)
 
 
 def require_both(model: str, **orders: Any) -> bool:

@@ -60,7 +60,7 @@ class Orders:
         ny = len(self.na)
         past = [(j, k) for j in range(ny) for k in range(1, self.na[row, j] + 1)]
         for j in range(self.nb.shape[1]):
-            past += [(ny + j, self.nk[row, j] + k) for k in range(self.nb[row, j])]
+            past += [(ny + j, int(self.nk[row, j]) + k) for k in range(self.nb[row, j])]
         return past
 
     def as_dict(self) -> dict[str, object]:

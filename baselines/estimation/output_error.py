@@ -10,13 +10,13 @@ from jaxtyping import Float
 from scipy.signal import lfilter
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import check_length, estimate_arx
+from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.gram import lagged_gram
-from simgap.baselines.estimation.levenberg import Cost, Minimum, minimise, stable, sum_up
+from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
-from simgap.records import Experiment
+from simgap.baselines.estimation.starts import oe_starts
+from simgap.records import Experiment, UnusableInput
 
 
 def estimate_oe(
@@ -25,13 +25,15 @@ def estimate_oe(
     orders: Orders,
     constant: bool = True,
     n_start: int | None = None,
+    start: LinearFit | None = None,
 ) -> LinearFit:
     """Minimise the squared simulation error, one output at a time, F kept stable (Ljung 1999, section 10.2).
 
     With n_start, each simulation starts from the state that the first n_start samples show, and only what follows
     counts: the error that is minimised is the free run that will be scored. Without it the start states are free
     parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
-    Raises UnusableInput when the experiments are too short for the order.
+    The search begins at `start`, a fit around the same operating point, or else at the two best of several linear
+    estimates. Raises UnusableInput when the experiments are too short for the order.
     """
     ny = len(orders.nb)
     rows, transfers, constants = [], [], np.zeros(ny)
@@ -39,12 +41,15 @@ def estimate_oe(
         equation = OutputError.of(experiments, shift, orders, i, constant, n_start)
         samples = equation.samples
         check_length(samples, equation.n_params, equation.n_start or 0)
-        starts = sorted(
-            _starts(experiments, shift, orders, i, equation), key=lambda theta: equation.cost(theta).squares
-        )
-        searches = [minimise(equation.cost, theta, equation.allowed, samples) for theta in starts[:2]]
+        if start:
+            begin = [equation.theta_of(start.rows[i])]
+        else:
+            candidates = oe_starts(experiments, shift, orders, i, equation)
+            begin = sorted(candidates, key=lambda theta: equation.cost(theta).squares)[:2]
+        searches = [minimise(equation.cost, theta, equation.allowed, samples) for theta in begin]
         best = min(searches, key=lambda search: search.cost.squares)
-        rows.append(_row(best, equation))
+        names = equation.names
+        rows.append(Row.at(best, names, range(len(names)), samples))
         transfers.append(equation.transfer(best.theta))
         constants[i] = best.theta[-1] if constant else 0.0
     return _assemble(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
@@ -59,8 +64,8 @@ class OutputError:
     point by least squares on the first n_start samples, or on all of them where n_start is None.
     """
 
-    u: list[Float[np.ndarray, "B T nu"]]
-    y: list[Float[np.ndarray, "B T"]]
+    u: list[Float[np.ndarray, "_ _ nu"]]
+    y: list[Float[np.ndarray, "_ _"]]
     nf: tuple[int, ...]
     nb: tuple[int, ...]
     nk: tuple[int, ...]
@@ -74,6 +79,8 @@ class OutputError:
         ny = len(orders.nb)
         numbers = (tuple(int(n) for n in of[output]) for of in (orders.nf, orders.nb, orders.nk))
         empty = cls([], [], *numbers, constant, None)
+        if not empty.used:
+            raise UnusableInput(f"no input acts on output {output + 1}; give it nb of at least 1")
         if n_start is not None:  # fewer samples than the state would leave it undetermined
             n_start = max(n_start, empty.state + 1)
         groups = [
@@ -96,6 +103,20 @@ class OutputError:
     @property
     def n_params(self) -> int:
         return sum(self.nf[j] + self.nb[j] for j in self.used) + self.constant
+
+    @property
+    def names(self) -> list[str]:
+        """f1, .., b1, .. of each input, with its number where there are several."""
+        names = []
+        for j in self.used:
+            channel = f"_{j + 1}" if len(self.nb) > 1 else ""
+            names += [f"f{k}{channel}" for k in range(1, self.nf[j] + 1)]
+            names += [f"b{self.nk[j] + k}{channel}" for k in range(self.nb[j])]
+        return names
+
+    def theta_of(self, row: Row) -> np.ndarray:
+        """The same coefficients, with no constant."""
+        return np.concatenate((row.values, np.zeros(int(self.constant))))
 
     @property
     def state(self) -> int:
@@ -189,67 +210,6 @@ class OutputError:
             change = lfilter([1.0], f, free[:n], axis=0)
             for k in range(1, self.nf[j] + 1):
                 slope[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
-
-
-def _starts(
-    experiments: Sequence[Experiment], shift: np.ndarray, orders: Orders, output: int, equation: OutputError
-) -> Iterator[np.ndarray]:
-    """Where to begin: ARX on the data and on the free run of a long ARX, each refined by Steiglitz and McBride (1965)."""
-    ny = len(orders.nb)
-    kept = [output, *range(ny, len(shift))]
-    own = [Experiment(e.name, e.u, e.y[:, output : output + 1], e.dt) for e in experiments]
-    yield from _prefiltered(own, shift[kept], orders, output, equation)
-    lags = max(orders.max_lag, int(orders.nf.max()))
-    length = min(3 * lags + 20, min(map(len, own)) // 4, sum(map(len, own)) // (4 * len(kept)))
-    if length > lags:
-        long = Orders.of(1, len(kept) - 1, na=length, nb=length, nk=1)
-        model = estimate_arx(lagged_gram(own, shift[kept], length), long).polynomial
-        if np.abs(model.poles).max() < 1:
-            n = model.order
-            smooth = [
-                Experiment(e.name, e.u[n:], model.simulate(e.u[None], e.y[None, :n])[0], e.dt) for e in own
-            ]
-            yield from _prefiltered(smooth, shift[kept], orders, output, equation)
-
-
-def _prefiltered(
-    experiments: Sequence[Experiment], shift: np.ndarray, orders: Orders, output: int, equation: OutputError
-) -> Iterator[np.ndarray]:
-    """theta of ARX fits to u/F and y/F, with F from the fit before."""
-    nf = max((equation.nf[j] for j in equation.used), default=0)
-    arx = Orders.of(1, len(equation.nb), na=nf, nb=[list(equation.nb)], nk=[list(equation.nk)])
-    f = np.ones(1)
-    for _ in range(8):
-        filtered = [
-            Experiment(
-                e.name,
-                lfilter([1.0], f, e.u - shift[1:], axis=0),
-                lfilter([1.0], f, e.y - shift[0], axis=0),
-                e.dt,
-            )
-            for e in experiments
-        ]
-        fit = estimate_arx(lagged_gram(filtered, np.zeros(len(shift)), arx.max_lag), arx)
-        f = stable(fit.polynomial.a[: nf + 1, 0, 0], radius=1 - 1e-3)[0]
-        roots = sorted(np.roots(f), key=abs, reverse=True)
-        theta = []
-        for j in equation.used:
-            own = np.real(np.poly(roots[: equation.nf[j]])) if equation.nf[j] < nf else f
-            theta += [own[1:], fit.polynomial.b[equation.nk[j] : equation.nk[j] + equation.nb[j], 0, j]]
-        yield np.concatenate([*theta, np.zeros(int(equation.constant))])
-
-
-def _row(best: Minimum, equation: OutputError) -> Row:
-    names, inputs = [], equation.used
-    for j in inputs:
-        channel = f"_{j + 1}" if len(equation.nb) > 1 else ""
-        names += [f"f{k}{channel}" for k in range(1, equation.nf[j] + 1)]
-        names += [f"b{equation.nk[j] + k}{channel}" for k in range(equation.nb[j])]
-    p, hessian = len(names), best.cost.hessian
-    variance = best.cost.squares / max(equation.samples - equation.n_params, 1)
-    covariance = variance * np.linalg.pinv(hessian, hermitian=True)[:p, :p]
-    rank = int(np.linalg.matrix_rank(hessian[:p, :p], hermitian=True))
-    return Row(tuple(names), best.theta[:p], covariance, variance, rank, best.converged)
 
 
 def _assemble(

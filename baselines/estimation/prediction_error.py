@@ -10,35 +10,39 @@ from jaxtyping import Float
 from scipy.signal import lfilter
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names, estimate_arx
+from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names
 from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.gram import Gram, lagged_gram
 from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
+from simgap.baselines.estimation.starts import armax_starts
 from simgap.records import Experiment
 
 
 def estimate_armax(
-    experiments: Sequence[Experiment], shift: Float[np.ndarray, " S"], orders: Orders, constant: bool = True
+    experiments: Sequence[Experiment],
+    shift: Float[np.ndarray, " S"],
+    orders: Orders,
+    constant: bool = True,
+    start: LinearFit | None = None,
 ) -> LinearFit:
-    """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, from two starts, C kept stable.
+    """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, C kept stable.
 
+    The search begins at `start`, a fit around the same operating point, or else at two linear estimates.
     Ljung 1999, sections 7.2 and 10.2. Raises UnusableInput when the experiments are too short for the order.
     """
     gram = lagged_gram(experiments, shift, orders.max_lag)
-    first = estimate_arx(gram, orders, constant)
     ny = len(orders.na)
     rows, constants, noise = [], np.zeros(ny), []
     for i in range(ny):
         check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
         equation = PredictionError.of(gram, orders, i, constant)
-        start = np.concatenate((first.rows[i].values, first.constants[i : i + 1] if constant else []))
-        searches = [
-            minimise(equation.cost, theta, equation.allowed, equation.samples)
-            for theta in _starts(gram, orders, i, equation, start)
-        ]
+        begin = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
+        searches = [minimise(equation.cost, theta, equation.allowed, equation.samples) for theta in begin]
         best = min(searches, key=lambda search: search.cost.squares)
-        rows.append(_row(best.theta, best.cost, equation, orders, i, constant, best.converged))
+        names = coefficient_names(orders.lagged(i), *orders.nb.shape)
+        names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
+        rows.append(Row.at(best, names, equation.coefficients, equation.samples))
         constants[i] = best.theta[equation.linear - 1] if constant else 0.0
         noise.append(equation.noise(best.theta))
     return assemble(gram, orders, tuple(rows), constants, noise)
@@ -53,10 +57,11 @@ class PredictionError:
     zero, they cost efficiency wherever 1/C rings for long; taken as free, C is drawn to the unit circle.
     """
 
-    u: list[Float[np.ndarray, "B T nu"]]
-    phi: list[Float[np.ndarray, "p B T"]]
-    y: list[Float[np.ndarray, "B T"]]
+    u: list[Float[np.ndarray, "_ _ nu"]]
+    phi: list[Float[np.ndarray, "p _ _"]]
+    y: list[Float[np.ndarray, "_ _"]]
     nc: int
+    constant: bool
 
     @classmethod
     def of(cls, gram: Gram, orders: Orders, output: int, constant: bool) -> PredictionError:
@@ -72,12 +77,24 @@ class PredictionError:
             inputs.append(signals[:, lags:, ny:])
             targets.append(signals[:, lags:, output])
             phi.append(np.stack([*columns, np.ones_like(targets[-1])] if constant else columns))
-        return cls(inputs, phi, targets, int(orders.nc[output]))
+        return cls(inputs, phi, targets, int(orders.nc[output]), constant)
 
     @property
     def linear(self) -> int:
         """How many coefficients stand before those of C."""
         return len(self.phi[0])
+
+    @property
+    def coefficients(self) -> list[int]:
+        """Where theta holds coefficients of A, B and C: everywhere but at the constant, which ends the linear part."""
+        kept = self.linear - self.constant
+        return [*range(kept), *range(self.linear, self.linear + self.nc)]
+
+    def theta_of(self, row: Row) -> np.ndarray:
+        """The same coefficients, with no constant."""
+        theta = np.zeros(self.linear + self.nc)
+        theta[self.coefficients] = row.values
+        return theta
 
     @property
     def samples(self) -> int:
@@ -143,50 +160,3 @@ class PredictionError:
             start[k, self.nc :] = lfilter(-c[self.nc - k :], c, impulse)
         basis = np.linalg.qr(start.T)[0]  # [nc + T, nc]
         return signals - (signals @ basis) @ basis.T
-
-
-def _starts(
-    gram: Gram, orders: Orders, output: int, equation: PredictionError, arx: np.ndarray
-) -> Iterator[np.ndarray]:
-    """Where to begin: Hannan and Rissanen's regression on the errors of a long ARX model (1982), and plain ARX."""
-    yield np.concatenate((arx, np.zeros(equation.nc)))
-    if equation.nc == 0:
-        return
-    # Long enough for 1/C to have died out, short enough to be estimated: log(T)^1.5, about 28 of 10,000 samples.
-    shortest = min(map(len, gram.experiments))
-    length = min(orders.max_lag + int(np.log(equation.samples) ** 1.5), shortest // 4)
-    length = max(orders.max_lag, min(length, equation.samples // (4 * sum(orders.nb.shape))))
-    long = Orders.of(*orders.nb.shape, na=length, nb=length, nk=1)
-    long_fit = estimate_arx(lagged_gram(gram.experiments, gram.shift, length), long)
-    yield equation.pseudo_linear(
-        [_errors_of(long_fit, u, y, output, gram.max_lag, equation.nc) for u, y in stack(gram.experiments)]
-    )
-
-
-def _errors_of(
-    fit: LinearFit, u: np.ndarray, y: np.ndarray, output: int, skip: int, before: int
-) -> np.ndarray:
-    """[B, before + T - skip]: one-step errors of one output, zero where they are not known."""
-    model = fit.polynomial
-    e = np.zeros((y.shape[0], before + y.shape[1] - skip))
-    signals = np.concatenate((y - model.y_mean, u - model.u_mean), axis=2)
-    taps = np.concatenate((model.a, -model.b), axis=2)[:, output]  # [N1, S]
-    known = sum(lfilter(taps[:, s], [1.0], signals[:, :, s], axis=1) for s in range(signals.shape[2]))[
-        :, model.order :
-    ]
-    e[:, before + model.order - skip :] = known
-    return e
-
-
-def _row(
-    theta, cost: Cost, equation: PredictionError, orders: Orders, output: int, constant: bool, converged: bool
-) -> Row:
-    """The coefficients without the constant, which becomes part of the operating point."""
-    ny, nu = orders.nb.shape
-    names = coefficient_names(orders.lagged(output), ny, nu)
-    names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
-    variance = cost.squares / max(equation.samples - len(theta), 1)
-    covariance = variance * np.linalg.pinv(cost.hessian, hermitian=True)
-    kept = np.delete(np.arange(len(theta)), equation.linear - 1 if constant else [])
-    rank = int(np.linalg.matrix_rank(cost.hessian[np.ix_(kept, kept)], hermitian=True))
-    return Row(names, theta[kept], covariance[np.ix_(kept, kept)], variance, rank, converged)

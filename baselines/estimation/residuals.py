@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.output_error import OutputError
@@ -49,7 +51,7 @@ def residual_analysis(
     A correlation at negative lags means feedback. The bounds are 1.96 standard deviations under the hypothesis that
     the model is right, with what the estimated parameters take away (Box and Pierce 1970) projected out,
 
-        r(tau) = z' e / (|z| |e|),   var z' e = sum_k R_e(k) R_Mz(k),   M = 1 - psi (psi' psi)^-1 psi',
+        r(tau) = z' e / (|z| |e|),   var z' e = z' M R_e M z,   M = 1 - psi (psi' psi)^-1 psi',
 
     for z(t) = u(t - tau) or e(t - tau) and psi the slopes of the errors (Ljung 1999, section 16.6). The plain 1/N is
     too wide at small lags, and wrong where residual and input are both coloured.
@@ -73,18 +75,15 @@ def _of_output(
 
 def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int) -> Iterator[tuple]:
     """e [T], slopes [p, T] and u [T, nu] of each experiment, over the same samples."""
-    model, row = fit.polynomial, fit.rows[output]
-    shift, before = np.concatenate((model.y_mean, model.u_mean)), 0
+    model, before = fit.polynomial, int(fit.orders.nc[output])
+    shift = np.concatenate((model.y_mean, model.u_mean))
     if fit.orders.nf.any():
         equation = OutputError.of(experiments, shift, fit.orders, output, True, None)
-        theta = np.concatenate((row.values, [0.0]))
     else:
-        before = int(fit.orders.nc[output])
-        linear = len(row.values) - before
         equation = PredictionError.of(
             lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True
         )
-        theta = np.insert(row.values, linear, 0.0)
+    theta = equation.theta_of(fit.rows[output])
     seen = 0
     for (e, slope), u in zip(equation.linearised(theta), equation.u, strict=True):
         for s in range(len(e)):
@@ -109,20 +108,22 @@ def _correlate(name: str, pieces: list, lags: range, signal_of, white: bool) -> 
     own = z - np.linalg.lstsq(psi.T, z.T, rcond=None)[0].T @ psi  # M z
     norms = np.linalg.norm(z, axis=1) * np.linalg.norm(e)
     norms[norms == 0] = 1.0
-    variance = np.sum(own**2, axis=1) * float(e @ e) / len(e)
-    if not white:
-        variance = _coloured_variance(errors, np.split(own, np.cumsum([len(x) for x in errors])[:-1], axis=1))
-    bounds = 1.96 * np.sqrt(np.maximum(variance, 0.0)) / norms
-    # A lag that the model's own regressors hold has correlation and bound zero, but for rounding.
-    return Correlation(name, np.array(lags), z @ e / norms, bounds + 1e-9)
+    if white:
+        variance = np.sum(own**2, axis=1) * float(e @ e) / len(e)
+    else:
+        ends = np.cumsum([len(part) for part in errors])[:-1]
+        variance = _coloured_variance(errors, np.split(own, ends, axis=1))
+    # z' M e rather than z' e: over these samples e is not quite orthogonal to psi any more. A lag that the model's
+    # own regressors hold has correlation and bound zero, but for rounding.
+    return Correlation(name, np.array(lags), own @ e / norms, 1.96 * np.sqrt(variance) / norms + 1e-9)
 
 
-def _coloured_variance(errors: list[np.ndarray], own: list[np.ndarray], reach: int = 50) -> np.ndarray:
-    """sum_k R_e(k) R_z(k) over |k| <= reach, tapered (Bartlett), with R_z a sum over samples, not a mean."""
+def _coloured_variance(errors: list[np.ndarray], own: list[np.ndarray], order: int = 5) -> np.ndarray:
+    """Variance of z' e for e = w / D(q), an autoregression fitted to the residual: var w * |z filtered backwards|^2."""
+    products = [sum(float(e[k:] @ e[: len(e) - k]) for e in errors) for k in range(order + 1)]
     total = sum(map(len, errors))
-    variance = np.zeros(len(own[0]))
-    for k in range(reach + 1):
-        e_k = sum(float(e[k:] @ e[: len(e) - k]) for e in errors if len(e) > k) / total
-        z_k = sum(np.sum(z[:, k:] * z[:, : z.shape[1] - k], axis=1) for z in own if z.shape[1] > k)
-        variance += (1 if k == 0 else 2) * (1 - k / (reach + 1)) * e_k * z_k
-    return variance
+    if products[0] == 0:
+        return np.zeros(len(own[0]))
+    d = np.concatenate(([1.0], -solve_toeplitz(products[:-1], products[1:])))
+    innovation = float(d @ products) / total
+    return innovation * sum(np.sum(lfilter([1.0], d, z[:, ::-1], axis=1) ** 2, axis=1) for z in own)

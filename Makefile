@@ -1,0 +1,93 @@
+# Every target sets up what it needs: .venv with the versions in requirements.lock.
+# Another Python: make test PYTHON=python3.12
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+JOBS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check
+# NumPy has the newest version that the peer sysidentpy accepts.
+PINNED := numpy==2.3.5
+
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+# The name holds the version, so that another Python makes another environment.
+INSTALLED := $(VENV)/installed-$(VERSION)
+
+.PHONY: help dev peers test test-slow benchmark speed lint lock clean
+
+help:
+	@echo "make benchmark   all models on all data sets at hand, as tables in the terminal and in results/"
+	@echo "make test        the tests; make test-slow for those that take minutes"
+	@echo "make lint        format, style and types; make dev sets up .venv and stops"
+	@echo "make speed       times, beside other tools after make peers"
+	@echo "make lock        newer versions into the lock files, with Python 3.11"
+	@echo "make clean       remove what was built, .venv included; results/ stays"
+
+dev: $(INSTALLED)
+
+# setuptools comes first and builds what has no wheel, so that nothing but locked versions is ever used.
+$(INSTALLED): requirements.lock pyproject.toml
+	@case "$(VERSION)" in 3.11|3.12|3.13) ;; *) \
+	  echo "simgap needs Python 3.11, 3.12 or 3.13, and '$(PYTHON)' is $(if $(VERSION),$(VERSION),not there); name another: make $(or $(MAKECMDGOALS),dev) PYTHON=python3.12" >&2; exit 1;; esac
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu install python3-venv" >&2; exit 1; }
+	@echo "Setting up $(VENV) with Python $(VERSION), about a minute ..."
+	@rm -rf $(VENV)
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) install --quiet $$(grep '^setuptools==' requirements.lock)
+	@$(PIP) install --quiet --use-pep517 --no-build-isolation -r requirements.lock
+	@$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+peers: $(VENV)/peers-$(VERSION)
+$(VENV)/peers-$(VERSION): requirements-peers.lock $(INSTALLED)
+	@$(PIP) install --quiet --no-deps -r requirements-peers.lock
+	@touch $@
+
+test: $(INSTALLED)
+	@echo "Slow tests are left out; make test-slow runs them."
+	@$(BIN)/python -m pytest -q -m "not slow"
+
+test-slow: $(INSTALLED)
+	@$(BIN)/python -m pytest -q -m slow
+
+# After an interruption, or with one more model, only what is not in results/ yet is run.
+benchmark: $(INSTALLED)
+	@[ ! -d results ] || echo "Carrying on in results/; delete it to run every job anew."
+	@failed=0; $(BIN)/simgap run full --jobs $(JOBS) --out results || failed=$$?; \
+	  [ $$failed -gt 1 ] || $(BIN)/simgap report results; exit $$failed
+
+speed: $(INSTALLED)
+	@$(BIN)/python -m pytest -q tests/speed
+
+# pyright finds the mapped name only in an installed copy; sed turns its paths back into ours.
+lint: $(INSTALLED)
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@rm -rf build
+	@$(PIP) install --quiet --no-deps --no-build-isolation --target build/typing .
+	@$(BIN)/pyright --pythonpath $(BIN)/python | sed -E \
+	  -e 's#[^ ]*build/typing/simgap/(baselines|neural|data|reports)/#\1/#' -e 's#[^ ]*build/typing/simgap/#benchmark/#'
+
+# The oldest Python decides, because packages drop it first. The comments on top of the files stay.
+lock:
+	@[ "$(VERSION)" = 3.11 ] || { echo "the lock files are made with Python 3.11: make lock PYTHON=python3.11" >&2; exit 1; }
+	@rm -rf build && mkdir build && $(PYTHON) -m venv build/lock
+	@build/lock/bin/python -m pip install --quiet --upgrade pip
+	@build/lock/bin/python -m pip install --quiet "$(PINNED)" --group dev .
+	@grep '^#' requirements.lock > build/requirements.lock
+	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap >> build/requirements.lock
+	@build/lock/bin/python -m pip install --quiet -r build/requirements.lock ".[peers]"
+	@grep '^#' requirements-peers.lock > build/requirements-peers.lock
+	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap \
+	  | grep -vxFf build/requirements.lock >> build/requirements-peers.lock
+	@mv build/requirements.lock build/requirements-peers.lock .
+	@git diff --stat -- '*.lock' || true
+
+clean:
+	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .benchmarks
+	@find . -name __pycache__ -prune -exec rm -rf {} +
