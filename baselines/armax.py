@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import rough_means
-from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, require_both
+from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
 from simgap.baselines.estimation.prediction_error import estimate_armax
 from simgap.records import Experiment
@@ -31,8 +31,10 @@ class Armax(LinearModel):
     offset: bool = True
 
     def given_orders(self, ny: int, nu: int) -> Orders | None:
-        given = require_both("armax", na=self.na, nb=self.nb, nc=self.nc)
-        return Orders.of(ny, nu, na=self.na, nb=self.nb, nk=self.nk, nc=self.nc) if given else None
+        check_together("armax", na=self.na, nb=self.nb, nc=self.nc)
+        if self.na is None or self.nb is None or self.nc is None:
+            return None
+        return Orders.of(ny, nu, na=self.na, nb=self.nb, nk=self.nk, nc=self.nc)
 
     def candidates(self, ny: int, nu: int) -> list[Orders]:
         return [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from simgap.baselines.estimation.equation_error import estimate_arx
 from simgap.baselines.estimation.gram import lagged_gram, rough_means
-from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, require_both
+from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
 from simgap.records import Experiment
 from simgap.registry import MODELS
@@ -31,15 +31,15 @@ class Arx(LinearModel):
     offset: bool = True
 
     def given_orders(self, ny: int, nu: int) -> Orders | None:
-        given = require_both("arx", na=self.na, nb=self.nb)
-        return Orders.of(ny, nu, na=self.na, nb=self.nb, nk=self.nk) if given else None
+        check_together("arx", na=self.na, nb=self.nb)
+        if self.na is None or self.nb is None:
+            return None
+        return Orders.of(ny, nu, na=self.na, nb=self.nb, nk=self.nk)
 
     def candidates(self, ny: int, nu: int) -> list[Orders]:
         # With nk = 0 one more coefficient of B reaches equally far back.
         return [
-            Orders.of(ny, nu, na=n, nb=n + (nk == 0), nk=nk)
-            for n in range(1, self.max_order + 1)
-            for nk in range(4)
+            Orders.of(ny, nu, na=n, nb=n + (nk == 0), nk=nk) for n in range(1, self.max_order + 1) for nk in range(4)
         ]
 
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:

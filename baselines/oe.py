@@ -8,7 +8,7 @@ from typing import Literal
 
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import rough_means
-from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, require_both
+from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
 from simgap.baselines.estimation.output_error import estimate_oe
 from simgap.records import Experiment
@@ -34,14 +34,14 @@ class Oe(LinearModel):
     offset: bool = True
 
     def given_orders(self, ny: int, nu: int) -> Orders | None:
-        given = require_both("oe", nb=self.nb, nf=self.nf)
-        return Orders.of(ny, nu, nb=self.nb, nk=self.nk, nf=self.nf) if given else None
+        check_together("oe", nb=self.nb, nf=self.nf)
+        if self.nb is None or self.nf is None:
+            return None
+        return Orders.of(ny, nu, nb=self.nb, nk=self.nk, nf=self.nf)
 
     def candidates(self, ny: int, nu: int) -> list[Orders]:
         return [
-            Orders.of(ny, nu, nb=n + (nk == 0), nk=nk, nf=n)
-            for n in range(1, self.max_order + 1)
-            for nk in range(2)
+            Orders.of(ny, nu, nb=n + (nk == 0), nk=nk, nf=n) for n in range(1, self.max_order + 1) for nk in range(2)
         ]
 
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:

@@ -112,14 +112,14 @@ def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Re
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
         trial = Trial(simulate, experiment, dataset.n_init, dataset.channels)
-        results += [_score(trial, task, about) for task in tasks]
+        results += [_score(trial, simulate, task, about) for task in tasks]
     units = {channel.name: channel.unit for channel in dataset.channels.outputs}
     return [replace(result, units=units) for result in results]
 
 
-def _score(trial: Trial, task: Task, about: Result) -> Result:
+def _score(trial: Trial, simulate: CheckedSimulation, task: Task, about: Result) -> Result:
     about = replace(about, experiment=trial.experiment.name, task=task.name)
-    before = trial.simulate.seconds
+    before = simulate.seconds
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an overflow shows in the figures
@@ -130,11 +130,9 @@ def _score(trial: Trial, task: Task, about: Result) -> Result:
     return replace(
         about,
         status="ok" if outcome.finite else "diverged",
-        message=about.message
-        if outcome.finite
-        else "the simulation grew beyond all bounds or is not a number",
+        message=about.message if outcome.finite else "the simulation grew beyond all bounds or is not a number",
         metrics=outcome.metrics,
-        simulate_seconds=trial.simulate.seconds - before,
+        simulate_seconds=simulate.seconds - before,
     )
 
 
@@ -173,6 +171,4 @@ def reason(method: str, error: BaseException) -> str:
         return f"{method} broke the protocol: {text}"
     frames = traceback.extract_tb(error.__traceback__)
     frame = next((f for f in reversed(frames) if "site-packages" not in f.filename), frames[-1])
-    return (
-        f"{method} raised {type(error).__name__}: {text} ({Path(frame.filename).name}, line {frame.lineno})"
-    )
+    return f"{method} raised {type(error).__name__}: {text} ({Path(frame.filename).name}, line {frame.lineno})"

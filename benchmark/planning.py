@@ -19,9 +19,7 @@ from simgap.suites import Entry, Suite
 Note = Callable[[str], None]
 
 
-def choose_entries(
-    suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note
-) -> list[Entry]:
+def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note) -> list[Entry]:
     """The models to run: those named in `models` and `files` (`file.py:Class`), or else the suite's.
 
     A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
@@ -43,15 +41,11 @@ def choose_entries(
     if twice := [label for label, params in keys if keys.count((label, params)) > 1]:
         raise UnusableInput(f"two models are called {twice[0]}; give one of them another name")
     if not entries:
-        raise UnusableInput(
-            f"none of the models of suite {suite.name} can be imported; name one with --models"
-        )
+        raise UnusableInput(f"none of the models of suite {suite.name} can be imported; name one with --models")
     return entries
 
 
-def sources(
-    datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None
-) -> list[Source]:
+def sources(datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None) -> list[Source]:
     """Where the named data sets come from. Columns and dt go to the CSV files among them, if there are."""
     files = [name for name in datasets if Path(name).is_file()]
     return [
@@ -77,9 +71,7 @@ def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple
     if twice := [name for name in names if names.count(name) > 1]:
         raise UnusableInput(f"two data sets are called {twice[0]}; give one of them another name")
     if not chosen:
-        raise UnusableInput(
-            f"none of the data sets of suite {suite.name} is at hand; name one with --datasets"
-        )
+        raise UnusableInput(f"none of the data sets of suite {suite.name} is at hand; name one with --datasets")
     return chosen
 
 

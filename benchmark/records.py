@@ -64,7 +64,7 @@ class Experiment:
                     f"{self.name}: {column} has {values.ndim} dimensions; give rows of samples, [T, n{column}]"
                 )
             # The extremes of an array with a NaN are NaN, and need no copy of a long record.
-            if values.size and not (-LARGEST_VALUE <= values.min() and values.max() <= LARGEST_VALUE):
+            if values.size and not (values.min() >= -LARGEST_VALUE and values.max() <= LARGEST_VALUE):
                 row, channel = np.argwhere(~(np.abs(values) <= LARGEST_VALUE))[0]
                 raise UnusableInput(
                     f"{self.name}: {column}[{row}, {channel}] is {values[row, channel]}, which is no measurement; "
@@ -112,9 +112,7 @@ class TrainingSet:
             object.__setattr__(self, "channels", Channels.unnamed(first.u.shape[1], first.y.shape[1]))
         _check_alike(self.train + self.valid, self.channels)
         if self.n_init < 1:
-            raise UnusableInput(
-                f"n_init is {self.n_init}; a simulation needs at least one measured sample to start"
-            )
+            raise UnusableInput(f"n_init is {self.n_init}; a simulation needs at least one measured sample to start")
 
     @property
     def dt(self) -> float:

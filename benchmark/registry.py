@@ -17,6 +17,11 @@ from simgap.records import UnusableInput
 T = TypeVar("T")
 
 
+def origin(target: Any) -> tuple[str, str]:
+    """Where a thing was defined; a module that is imported again defines the same thing."""
+    return target.__module__, target.__qualname__
+
+
 @dataclass
 class Registry:
     """Things of one kind by name, found by scanning packages for `@REGISTRY.register("name")`.
@@ -36,10 +41,7 @@ class Registry:
 
         def add(target: T) -> T:
             taken = self._found.get(name)
-            if taken is not None and (taken.__module__, taken.__qualname__) != (
-                target.__module__,
-                target.__qualname__,
-            ):
+            if taken is not None and origin(taken) != origin(target):
                 raise ValueError(f"two {self.kind}s are called {name!r}: {taken!r} and {target!r}")
             self._found[name] = target
             return target

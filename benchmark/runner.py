@@ -78,9 +78,7 @@ def run(
     if len(todo) < len(planned):
         note(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")
     results = [row for rows in stored for row in rows]
-    with contextlib.closing(
-        _execute_all(todo, min(jobs, len(todo)), threads, chosen.timeout, tell)
-    ) as outcomes:
+    with contextlib.closing(_execute_all(todo, min(jobs, len(todo)), threads, chosen.timeout, tell)) as outcomes:
         for rows in outcomes:
             store.append(Path(out), chosen.name, rows)
             results += rows

@@ -144,9 +144,7 @@ def _check_fields(row: dict[str, Any], where: str) -> None:
 
 def _figures(figures: Any, where: str) -> dict[str, Any]:
     if not isinstance(figures, dict):
-        raise UnusableInput(
-            f"{where}: the metrics of an output are a {type(figures).__name__}, not figures by name"
-        )
+        raise UnusableInput(f"{where}: the metrics of an output are a {type(figures).__name__}, not figures by name")
     decoded: dict[str, Any] = {}
     for name, value in figures.items():
         match value:
@@ -157,9 +155,7 @@ def _figures(figures: Any, where: str) -> dict[str, Any]:
             case int() | float() if not isinstance(value, bool):
                 decoded[name] = value
             case _:
-                raise UnusableInput(
-                    f"{where}: the metric {name!r} is {str(value)[:40]!r}, which is no number"
-                )
+                raise UnusableInput(f"{where}: the metric {name!r} is {str(value)[:40]!r}, which is no number")
     return decoded
 
 

@@ -54,9 +54,7 @@ def load_suite(name: str) -> Suite:
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not path.is_file():
         known = ", ".join(suite_names())
-        raise UnusableInput(
-            f"there is no suite {name!r}; known are {known}, or give the path of a .toml file"
-        )
+        raise UnusableInput(f"there is no suite {name!r}; known are {known}, or give the path of a .toml file")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:  # no TOML, or no UTF-8
@@ -102,7 +100,7 @@ class _Reader:
             raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
         for table in tables:
             self._refuse_unknown(table, ("name", "params", "label"))
-            entry = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
+            entry: tuple[Any, ...] = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
             if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
                 raise UnusableInput(f"{self.path}: a model needs a name, a table params and a text as label")
             if entry[0] == "all":

@@ -39,9 +39,7 @@ def read_description(file: Path) -> Description:
         raise UnusableInput(f"{file}: sampling_time must be a positive number of seconds, such as 0.1")
     if n_init is not None and (type(n_init) is not int or not 1 <= n_init <= 2**31):
         raise UnusableInput(f"{file}: n_init must be a whole number of samples, 1 or more")
-    channels = Channels(
-        _channels(content["inputs"], "inputs", file), _channels(content["outputs"], "outputs", file)
-    )
+    channels = Channels(_channels(content["inputs"], "inputs", file), _channels(content["outputs"], "outputs", file))
     time = _text(content["time"], "time", file) if "time" in content else None
     check_columns(columns_of(channels) + ((time,) if time else ()), str(file))
     splits = content["splits"]
@@ -103,15 +101,11 @@ def _channels(entries: Any, key: str, file: Path) -> tuple[Channel, ...]:
 
 def _text(value: Any, key: str, file: Path, may_be_empty: bool = False) -> str:
     if not isinstance(value, str) or not value.isprintable() or not (value or may_be_empty):
-        raise UnusableInput(
-            f"{file}: {key} must be a text in quotes on one line, not {short(type(value).__name__)}"
-        )
+        raise UnusableInput(f"{file}: {key} must be a text in quotes on one line, not {short(type(value).__name__)}")
     return value
 
 
-def _check_keys(
-    content: dict[str, Any], known: tuple[str, ...], where: str, required: tuple[str, ...]
-) -> None:
+def _check_keys(content: dict[str, Any], known: tuple[str, ...], where: str, required: tuple[str, ...]) -> None:
     for key in content:
         if key not in known:
             raise UnusableInput(f"{where}: unknown key {short(key)}; known are {', '.join(known)}")

@@ -34,9 +34,7 @@ def fetch(name: str) -> Path:
     """
     source = _source(name)
     if source is None:
-        raise UnusableInput(
-            f"{name} needs no download; load it, or write it to files with `simgap data make`"
-        )
+        raise UnusableInput(f"{name} needs no download; load it, or write it to files with `simgap data make`")
     found = source.folder()
     if found is not None:
         return found

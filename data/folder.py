@@ -20,8 +20,7 @@ def load_folder(folder: Path) -> Dataset:
     files = {split: _matching(folder, split, pattern) for split, pattern in described.splits.items()}
     names = _experiment_names(folder, files)
     records = {
-        split: tuple(_experiment(file, names[file], described) for file in found)
-        for split, found in files.items()
+        split: tuple(_experiment(file, names[file], described) for file in found) for split, found in files.items()
     }
     train = records["train"]
     if "valid" in records:
@@ -58,9 +57,7 @@ def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
         if flavour.anchor or ".." in flavour.parts or not flavour.parts:
             raise UnusableInput(f"{where} leads out of the folder; write it like 'train/*.csv'")
     try:
-        found = sorted(
-            folder.glob(pattern), key=lambda file: natural_order(file.relative_to(folder).as_posix())
-        )
+        found = sorted(folder.glob(pattern), key=lambda file: natural_order(file.relative_to(folder).as_posix()))
         inside = [file.resolve().is_relative_to(folder.resolve()) for file in found]
     except (ValueError, NotImplementedError, OSError, RuntimeError) as error:  # the last for loops of links
         raise UnusableInput(f"{where} is no usable pattern ({error}); write it like 'train/*.csv'") from None
@@ -68,9 +65,7 @@ def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
         raise UnusableInput(f"{where} matches no file; add files or correct the pattern")
     for file, is_inside in zip(found, inside, strict=True):
         if not is_inside:
-            raise UnusableInput(
-                f"{where} matches {file}, a link out of the folder; copy the file into the folder"
-            )
+            raise UnusableInput(f"{where} matches {file}, a link out of the folder; copy the file into the folder")
         if file.is_dir():
             raise UnusableInput(f"{where} matches {file}, a folder; let it match CSV files only")
     return found

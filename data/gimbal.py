@@ -37,7 +37,7 @@ class Planned(NamedTuple):
     """One experiment to be made. `split` is 0 for training, 1 for validation, 2 for test."""
 
     split: int
-    index: int
+    number: int
     session: int
     kind: str
 
@@ -99,7 +99,7 @@ def _plan(counts: Sequence[int]) -> list[Planned]:
 
 def _record(parameters: Gimbal, seed: int, planned: Planned, samples: int, name: str) -> Experiment:
     # The seed of an experiment is its place in its split, so that no split depends on the size of another.
-    input_rng, plant_rng = default_rng([seed, planned.split, planned.index]).spawn(2)
+    input_rng, plant_rng = default_rng([seed, planned.split, planned.number]).spawn(2)
     u = INPUTS[planned.kind](samples, input_rng)[:, None]  # [T, 1]
     friction = parameters.session_friction[planned.session]
     today = replace(parameters, coulomb=parameters.coulomb * friction, viscous=parameters.viscous * friction)

@@ -54,4 +54,4 @@ def _noise(samples: int, colour: float, dt: float, rng: Generator) -> Float[np.n
     noise = rng.standard_normal((samples, 2))  # [n, 2]
     keep = colour ** (dt / KEPT_EVERY)
     noise[1:] *= np.sqrt(1 - keep**2)
-    return lfilter([1.0], [1.0, -keep], noise, axis=0)
+    return np.asarray(lfilter([1.0], [1.0, -keep], noise, axis=0))

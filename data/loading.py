@@ -56,9 +56,7 @@ def _refuse_columns(declared: bool, source: str) -> None:
         raise UnusableInput(f"{source} knows its columns, sampling time and name; leave those arguments out")
 
 
-def _dataset_of(
-    table: Table, inputs: Sequence[str], outputs: Sequence[str], dt: float | None, name: str
-) -> Dataset:
+def _dataset_of(table: Table, inputs: Sequence[str], outputs: Sequence[str], dt: float | None, name: str) -> Dataset:
     for column_list, role in ((inputs, "inputs"), (outputs, "outputs")):
         if isinstance(column_list, str) or not column_list:
             raise UnusableInput(

@@ -81,8 +81,8 @@ def reads(
             return source.read(folder)
 
         functools.update_wrapper(load_files, build)
-        del load_files.__wrapped__  # the signature is the one without the folder
-        load_files.source = source
+        del load_files.__wrapped__  # type: ignore[attr-defined]  # the signature is the one without the folder
+        load_files.source = source  # type: ignore[attr-defined]
         return load_files
 
     return tie

@@ -32,18 +32,14 @@ def _download(benchmark: str, folder: Path) -> None:
 
 def _official(benchmark: str, folder: Path) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """The package's training and test records. All files must be there, or the package would download."""
-    train, test = _package(benchmark)(
-        dir_placement=folder, atleast_2d=True, always_return_tuples_of_datasets=True
-    )
+    train, test = _package(benchmark)(dir_placement=folder, atleast_2d=True, always_return_tuples_of_datasets=True)
     return tuple(train), tuple(test)
 
 
 def _dataset(name: str, train: dict[str, Any], test: dict[str, Any], channels: Channels) -> Dataset:
     heads, tails = hold_out_tails(_experiments(train))
     n_init = {record.state_initialization_window_length for record in test.values()}
-    assert len(n_init) == 1, (
-        f"{name}: the package scores its test records from different samples on: {n_init}"
-    )
+    assert len(n_init) == 1, f"{name}: the package scores its test records from different samples on: {n_init}"
     return assemble(name, (heads, tails, _experiments(test)), channels, n_init.pop(), name)
 
 

@@ -25,9 +25,7 @@ def hold_out_tails(records: Sequence[Experiment]) -> tuple[Experiments, Experime
     """Each record without its last quarter, and the last quarters as experiments of their own."""
     cuts = [len(record) - len(record) // 4 for record in records]
     heads = tuple(record[:cut] for record, cut in zip(records, cuts, strict=True))
-    tails = tuple(
-        replace(record[cut:], name=f"{record.name}_tail") for record, cut in zip(records, cuts, strict=True)
-    )
+    tails = tuple(replace(record[cut:], name=f"{record.name}_tail") for record, cut in zip(records, cuts, strict=True))
     return heads, tails
 
 

@@ -154,8 +154,7 @@ def _rows(path: Path, text: str) -> Iterator[list[str]]:
         for number, row in enumerate(reader, start=1):
             if reader.line_num != number:
                 raise UnusableInput(
-                    f"{path}: row {number}: a cell in quotes runs over several lines; "
-                    f"keep each sample on one line"
+                    f"{path}: row {number}: a cell in quotes runs over several lines; keep each sample on one line"
                 )
             yield row
     except csv.Error as error:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy import fft
+from scipy.fft import next_fast_len
 from scipy.stats import chi2
 
 from simgap.records import UnusableInput
@@ -62,8 +62,8 @@ def whiteness(u: Float[np.ndarray, " T"], max_lag: int = 20) -> Whiteness:
     # An input that never moves still leaves rounding errors of its mean.
     if np.abs(centred).max() <= 1e-12 * np.abs(u).max():
         raise UnusableInput("the input never moves, so it has no autocorrelation; excite the plant")
-    spectrum = fft.rfft(centred, n=fft.next_fast_len(samples + max_lag, real=True))
-    covariance = fft.irfft(np.abs(spectrum) ** 2)[: max_lag + 1]  # [L+1]
+    spectrum = np.fft.rfft(centred, n=next_fast_len(samples + max_lag, real=True))
+    covariance = np.fft.irfft(np.abs(spectrum) ** 2)[: max_lag + 1]  # [L+1]
     correlation = covariance / covariance[0]  # [L+1]
     lags = np.arange(max_lag + 1)
     bound = 1.96 / np.sqrt(samples)

@@ -19,10 +19,7 @@ def published_tables() -> list[Table]:
         Table(
             title=source["title"],
             columns=["model", *(" ".join(column) for column in source["columns"])],
-            rows=[
-                [Cell(model), *(Cell(f"{figure:g}") for figure in row)]
-                for model, row in source["rmse"].items()
-            ],
+            rows=[[Cell(model), *(Cell(f"{figure:g}") for figure in row)] for model, row in source["rmse"].items()],
             notes=[f"{source['where']}. Scored: {source['window']}."],
         )
         for source in sources

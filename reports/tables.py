@@ -97,11 +97,7 @@ def dataset_table(results: Sequence[Result], dataset: str) -> Table:
     found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
     rows = []
     for standing in found:
-        errors = [
-            _cell(standing.rmse(output, group), ".4g", standing.failed)
-            for group in groups
-            for output in units
-        ]
+        errors = [_cell(standing.rmse(output, group), ".4g", standing.failed) for group in groups for output in units]
         ahead = [_ahead(standing, output, horizons) for output in units if horizons]
         size, seconds = standing.n_params(), standing.seconds()
         rows.append([
@@ -178,9 +174,7 @@ def _mark_best(rows: list[list[Cell]], column: int, best_of: Callable[[list[floa
 
 
 def _horizons(rows: Sequence[Result]) -> list[str]:
-    present = {
-        h for row in rows for figures in row.metrics.values() for h in figures.get("rmse_by_horizon", {})
-    }
+    present = {h for row in rows for figures in row.metrics.values() for h in figures.get("rmse_by_horizon", {})}
     return [horizon for horizon in HORIZONS if horizon in present]
 
 

@@ -84,9 +84,7 @@ def test_models_are_reached_only_by_name(part):
 def test_nobody_imports_the_command_line():
     for module, path in MODULES.items():
         if part_of(module) != "cli":
-            assert "cli" not in {part_of(name) for name in imports(path)}, (
-                f"{module} imports the command line"
-            )
+            assert "cli" not in {part_of(name) for name in imports(path)}, f"{module} imports the command line"
 
 
 def test_a_part_is_known_to_this_test():

@@ -23,9 +23,7 @@ def toy_experiment(seed: int, length: int = 160) -> Experiment:
 
 
 def training_set(first: int = 0) -> TrainingSet:
-    return TrainingSet(
-        tuple(toy_experiment(first + i) for i in range(4)), (toy_experiment(first + 4),), n_init=N_INIT
-    )
+    return TrainingSet(tuple(toy_experiment(first + i) for i in range(4)), (toy_experiment(first + 4),), n_init=N_INIT)
 
 
 def simulate(model: Model, experiment: Experiment) -> np.ndarray:

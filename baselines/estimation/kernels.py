@@ -7,7 +7,7 @@ from numba import njit
 
 
 @njit(cache=True)
-def filter_matrix(a, b, u, z):  # noqa: ANN001, ANN201 - numba infers the types
+def filter_matrix(a, b, u, z):
     """Run A(q) y = B(q) u from the state z: a [N, ny, ny] lags 1..N, b [M, ny, nu] lags 0..M-1, u [B, T, nu],
     z [B, N, ny], the part of the first N outputs that comes from before the record. Returns y [B, T, ny].
     """

@@ -68,18 +68,17 @@ def solve(gram: Gram, target: Lagged, regressors: Sequence[Lagged], constant: bo
     return _in_units(gram, columns, theta, inverse, squares, p)
 
 
-def _refine(
-    gram: Gram, columns: _Columns, inverse: np.ndarray, theta: np.ndarray
-) -> tuple[np.ndarray, float]:
+def _refine(gram: Gram, columns: _Columns, inverse: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, float]:
     """Correct theta by the least-squares solution for what it leaves over, until that is rounding noise."""
+    gradient, squares = _left_over(gram, columns, theta)
     last = np.inf
     for _ in range(8):
-        gradient, squares = _left_over(gram, columns, theta)
         change = inverse @ gradient
         size = np.abs(change).max()
         if not size < last:
             break
         theta, last = theta + change, size / 2
+        gradient, squares = _left_over(gram, columns, theta)
     return theta, squares
 
 
@@ -101,13 +100,14 @@ def _left_over(gram: Gram, columns: _Columns, theta: np.ndarray) -> tuple[np.nda
 def _solve_by_qr(gram: Gram, columns: _Columns) -> Estimate:
     """Stack the triangular factor on each piece of the data and factor again: QR in the memory of one piece."""
     p = len(columns.scale) - 1
-    triangle = np.zeros((0, p + 1 + columns.with_constant))
+    triangle: np.ndarray = np.zeros((0, p + 1 + columns.with_constant))
     for lagged in _pieces(gram, columns):
         rows = np.stack(lagged, axis=1) / columns.scale
         if columns.with_constant:  # first, so that the rest of the triangle is free of it
             rows = np.hstack((np.ones((len(rows), 1)), rows))
-        triangle = np.linalg.qr(np.vstack((triangle, rows)), mode="r")
-    triangle = triangle[columns.with_constant :, columns.with_constant :]
+        triangle = np.asarray(np.linalg.qr(np.vstack((triangle, rows)), mode="r"))
+    first = int(columns.with_constant)
+    triangle = triangle[first:, first:]
     left, singular, right = np.linalg.svd(triangle[:, :p], full_matrices=False)
     rank = int(np.sum(singular > singular[0] * max(gram.rows, p) * np.finfo(float).eps))
     pseudo = (right[:rank].T / singular[:rank]) @ left[:, :rank].T
@@ -121,8 +121,7 @@ def _pieces(gram: Gram, columns: _Columns):
     for signals in gram.chunks():
         length = signals.shape[1]
         yield [
-            signals[i, gram.max_lag - lag : length - lag]
-            for i, lag in zip(columns.signal, columns.lag, strict=True)
+            signals[i, gram.max_lag - lag : length - lag] for i, lag in zip(columns.signal, columns.lag, strict=True)
         ]
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-
 # A search that gains less than 1e-5 of the error in this many steps has ended.
 CRAWL = 10
 
@@ -26,11 +25,11 @@ def sum_up(linearised: Iterable[tuple[np.ndarray, np.ndarray]]) -> Cost:
     """The cost of errors e [..] with slopes de/dtheta [p, ..], group after group."""
     squares, gradient, hessian = 0.0, 0.0, 0.0
     for e, slope in linearised:
-        slope = slope.reshape(len(slope), -1)
+        flat = slope.reshape(len(slope), -1)
         squares += float(np.vdot(e, e))
-        gradient = gradient + slope @ e.ravel()
-        hessian = hessian + slope @ slope.T
-    return Cost(squares, gradient, hessian)
+        gradient = gradient + flat @ e.ravel()
+        hessian = hessian + flat @ flat.T
+    return Cost(squares, np.asarray(gradient), np.asarray(hessian))
 
 
 @dataclass(frozen=True, eq=False)

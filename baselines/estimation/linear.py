@@ -101,9 +101,7 @@ class LinearModel(ABC):
             chosen = min(fits, key=lambda fit: fit.criterion(penalty))
         return chosen.orders, chosen
 
-    def _fits(
-        self, experiments: Sequence[Experiment], n_init: int, candidates: list[Orders]
-    ) -> list[LinearFit]:
+    def _fits(self, experiments: Sequence[Experiment], n_init: int, candidates: list[Orders]) -> list[LinearFit]:
         longest = max(map(len, experiments))
         short_enough = [orders for orders in candidates if orders.max_lag < longest // 4]
         estimate = self.estimator(experiments, n_init, max((o.max_lag for o in short_enough), default=0))
@@ -141,7 +139,7 @@ def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_i
 def free_run_errors(
     model: Polynomial, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
 ) -> Float[np.ndarray, " K"]:
-    """Mean over the outputs of mse / variance, in at least `pieces` pieces of all experiments; inf where it diverges."""
+    """Mean over the outputs of mse / variance, in `pieces` pieces or more of all experiments; inf if it diverges."""
     spread = np.concatenate([e.y[n_init:] for e in experiments]).var(axis=0)
     spread[spread == 0] = 1.0
     each = -(-pieces // len(experiments))
@@ -154,9 +152,8 @@ def free_run_errors(
     return np.where(np.isfinite(errors), errors, np.inf)
 
 
-def require_both(model: str, **orders: Any) -> bool:
-    """Whether orders were given. Raises UnusableInput when some were and others not."""
+def check_together(model: str, **orders: Any) -> None:
+    """Raises UnusableInput when some of these orders were given and others not."""
     given = [name for name, value in orders.items() if value is not None]
     if given and len(given) < len(orders):
         raise UnusableInput(f"{model}: {', '.join(orders)} belong together; only {', '.join(given)} given")
-    return bool(given)

@@ -30,9 +30,7 @@ class Orders:
     nf: Int[np.ndarray, "ny nu"]
 
     @classmethod
-    def of(
-        cls, ny: int, nu: int, na: Order = 0, nb: Order = 0, nk: Order = 0, nc: Order = 0, nf: Order = 0
-    ) -> Orders:
+    def of(cls, ny: int, nu: int, na: Order = 0, nb: Order = 0, nk: Order = 0, nc: Order = 0, nf: Order = 0) -> Orders:
         """Spread plain numbers over all pairs of channels. Raises UnusableInput for a wrong shape or sign."""
         orders = cls(
             na=_spread("na", na, (ny, ny)),

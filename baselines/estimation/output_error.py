@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import lfilter
 
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import check_length
+from simgap.baselines.estimation.filters import divide, multiply
 from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
@@ -36,7 +36,7 @@ def estimate_oe(
     estimates. Raises UnusableInput when the experiments are too short for the order.
     """
     ny = len(orders.nb)
-    rows, transfers, constants = [], [], np.zeros(ny)
+    rows, transfers, constants, samples = [], [], np.zeros(ny), 0
     for i in range(ny):
         equation = OutputError.of(experiments, shift, orders, i, constant, n_start)
         samples = equation.samples
@@ -73,12 +73,10 @@ class OutputError:
     n_start: int | None
 
     @classmethod
-    def of(
-        cls, experiments, shift: np.ndarray, orders: Orders, output: int, constant: bool, n_start: int | None
-    ):
+    def of(cls, experiments, shift: np.ndarray, orders: Orders, output: int, constant: bool, n_start: int | None):
         ny = len(orders.nb)
-        numbers = (tuple(int(n) for n in of[output]) for of in (orders.nf, orders.nb, orders.nk))
-        empty = cls([], [], *numbers, constant, None)
+        nf, nb, nk = (tuple(int(n) for n in of[output]) for of in (orders.nf, orders.nb, orders.nk))
+        empty = cls([], [], nf, nb, nk, constant, None)
         if not empty.used:
             raise UnusableInput(f"no input acts on output {output + 1}; give it nb of at least 1")
         if n_start is not None:  # fewer samples than the state would leave it undetermined
@@ -165,9 +163,9 @@ class OutputError:
         projection: e = P r with P = 1 - R pinv(R_n) over the first n samples (Golub and Pereyra 1973).
         """
         for u, y in zip(self.u, self.y, strict=True):
-            filtered = {j: lfilter([1.0], f, u[:, :, j]) for j, _, f, _ in self.split(theta)}
-            responses = {j: lfilter(b, [1.0], filtered[j]) for j, b, _, _ in self.split(theta)}
-            residual = y - sum(responses.values()) - (theta[-1] if self.constant else 0.0)
+            filtered = {j: divide(u[:, :, j], f) for j, _, f, _ in self.split(theta)}
+            responses = {j: multiply(b, filtered[j]) for j, b, _, _ in self.split(theta)}
+            residual = y - np.sum(list(responses.values()), axis=0) - (theta[-1] if self.constant else 0.0)
             free, inverse = self._free_responses(theta, y.shape[1])
             n = inverse.shape[1]
             start = residual[:, :n] @ inverse.T @ free.T  # what the plant's past adds to the output
@@ -182,7 +180,7 @@ class OutputError:
     def _free_responses(self, theta: np.ndarray, length: int) -> tuple[np.ndarray, np.ndarray]:
         """R [T, N], and the pseudo-inverse [N, n] of its first n_start rows."""
         common, _ = self.transfer(theta)
-        free = lfilter([1.0], common, np.eye(self.state, length)).T
+        free = divide(np.eye(self.state, length), common).T
         return free, np.linalg.pinv(free[: self.n_start], rcond=1e-10)
 
     def _slope(self, theta: np.ndarray, filtered: dict, responses: dict, start: np.ndarray) -> np.ndarray:
@@ -190,7 +188,7 @@ class OutputError:
         slope = np.zeros((self.n_params, *start.shape))
         length = start.shape[1]
         for j, _, f, part in self.split(theta):
-            twice = lfilter([1.0], f, responses[j] + start)
+            twice = divide(responses[j] + start, f)
             for k in range(1, self.nf[j] + 1):
                 slope[part.start + k - 1, :, k:] = twice[:, : length - k]
             for k in range(self.nb[j]):
@@ -200,14 +198,12 @@ class OutputError:
             slope[-1] = -1.0
         return slope
 
-    def _add_change_of_fit(
-        self, slope: np.ndarray, theta: np.ndarray, free, inverse, misfit: np.ndarray
-    ) -> None:
+    def _add_change_of_fit(self, slope: np.ndarray, theta: np.ndarray, free, inverse, misfit: np.ndarray) -> None:
         """The part of dz/df that the misfit [B, n] of the first samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
         n = misfit.shape[1]
         spread = free @ (inverse @ inverse.T)  # [T, N]
         for j, _, f, part in self.split(theta):
-            change = lfilter([1.0], f, free[:n], axis=0)
+            change = divide(free[:n], f, axis=0)
             for k in range(1, self.nf[j] + 1):
                 slope[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
 

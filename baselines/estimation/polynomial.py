@@ -48,9 +48,7 @@ class Polynomial:
         state = self._state_after(u[:, :n], y_init - self.y_mean)
         return filter_matrix(self.a[1:], self.b, u[:, n:], state) + self.y_mean
 
-    def predict(
-        self, u: Float[np.ndarray, "B T nu"], y: Float[np.ndarray, "B T ny"]
-    ) -> Float[np.ndarray, "B T ny"]:
+    def predict(self, u: Float[np.ndarray, "B T nu"], y: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T ny"]:
         """One-step predictions y_hat(t | t-1) from measured outputs; the start state fits the whole record."""
         u, y = u - self.u_mean, y - self.y_mean
         return self._follow(u, y, self._start_state(u, y)) + self.y_mean
@@ -76,7 +74,7 @@ class Polynomial:
         """
         import control
 
-        return control.ss(*self.state_space, self.dt)
+        return control.StateSpace(*self.state_space, self.dt)
 
     @cached_property
     def _predictor(self) -> Float[np.ndarray, "N1 ny nuy"]:
@@ -105,9 +103,7 @@ class Polynomial:
         ny, size = len(self.y_mean), self.order * len(self.y_mean)
         unit = np.eye(size).reshape(size, self.order, ny)
         return (
-            filter_matrix(
-                self.c[1:], self._predictor[:1], np.zeros((size, n, self._predictor.shape[2])), unit
-            )
+            filter_matrix(self.c[1:], self._predictor[:1], np.zeros((size, n, self._predictor.shape[2])), unit)
             .reshape(size, n * ny)
             .T
         )

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.signal import lfilter
 
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names
+from simgap.baselines.estimation.filters import divide, multiply
 from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.gram import Gram, lagged_gram
 from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
@@ -110,9 +110,7 @@ class PredictionError:
 
     def errors(self, theta: np.ndarray) -> list[np.ndarray]:
         """[B, nc + T]: the nc samples of e before the record that make the sum of squares smallest, then e."""
-        residuals = (
-            y - np.tensordot(theta[: self.linear], phi, 1) for phi, y in zip(self.phi, self.y, strict=True)
-        )
+        residuals = (y - np.tensordot(theta[: self.linear], phi, 1) for phi, y in zip(self.phi, self.y, strict=True))
         return [self._without_start(self._filtered(residual, theta), theta) for residual in residuals]
 
     def past(self, e: np.ndarray) -> np.ndarray:
@@ -137,17 +135,14 @@ class PredictionError:
     def pseudo_linear(self, errors: list[np.ndarray]) -> np.ndarray:
         """theta by least squares on Phi and on past errors that are taken as known."""
         p = self.linear + self.nc
-        columns = [
-            np.concatenate((phi, self.past(e))).reshape(p, -1)
-            for phi, e in zip(self.phi, errors, strict=True)
-        ]
+        columns = [np.concatenate((phi, self.past(e))).reshape(p, -1) for phi, e in zip(self.phi, errors, strict=True)]
         target = np.concatenate([y.ravel() for y in self.y])
         return self.allowed(np.linalg.lstsq(np.concatenate(columns, axis=1).T, target, rcond=None)[0])[0]
 
     def _filtered(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """signals / C with nothing in the nc samples before them."""
         before = np.zeros((*signals.shape[:-1], self.nc))
-        return np.concatenate((before, lfilter([1.0], self.noise(theta), signals)), axis=-1)
+        return np.concatenate((before, divide(signals, self.noise(theta))), axis=-1)
 
     def _without_start(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Project signals [..., nc + T] off what e before the record adds: itself, and its echo through 1/C."""
@@ -157,6 +152,6 @@ class PredictionError:
         impulse = np.eye(1, length - self.nc)[0]
         start = np.eye(self.nc, length)
         for k in range(self.nc):  # row k is a unit e, nc - k samples before the record
-            start[k, self.nc :] = lfilter(-c[self.nc - k :], c, impulse)
+            start[k, self.nc :] = divide(multiply(-c[self.nc - k :], impulse), c)
         basis = np.linalg.qr(start.T)[0]  # [nc + T, nc]
         return signals - (signals @ basis) @ basis.T

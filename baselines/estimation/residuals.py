@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
+from simgap.baselines.estimation.filters import divide
 from simgap.baselines.estimation.fitted import LinearFit
+from simgap.baselines.estimation.gram import lagged_gram
 from simgap.baselines.estimation.output_error import OutputError
 from simgap.baselines.estimation.prediction_error import PredictionError
-from simgap.baselines.estimation.gram import lagged_gram
 from simgap.records import Experiment
 
 # Correlations settle long before; more samples would only cost memory.
@@ -43,9 +43,7 @@ class Correlation:
         )
 
 
-def residual_analysis(
-    fit: LinearFit, experiments: Sequence[Experiment], max_lag: int = 25
-) -> list[list[Correlation]]:
+def residual_analysis(fit: LinearFit, experiments: Sequence[Experiment], max_lag: int = 25) -> list[list[Correlation]]:
     """For each output: the residual with its own past, lags 1..L, then with each input, lags -L..L.
 
     A correlation at negative lags means feedback. The bounds are 1.96 standard deviations under the hypothesis that
@@ -59,9 +57,7 @@ def residual_analysis(
     return [_of_output(fit, experiments, i, max_lag) for i in range(len(fit.rows))]
 
 
-def _of_output(
-    fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int
-) -> list[Correlation]:
+def _of_output(fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int) -> list[Correlation]:
     pieces = list(_aligned(fit, experiments, output, max_lag))
     nu = fit.orders.nb.shape[1]
     own = range(1, max_lag + 1)
@@ -80,9 +76,7 @@ def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int, max
     if fit.orders.nf.any():
         equation = OutputError.of(experiments, shift, fit.orders, output, True, None)
     else:
-        equation = PredictionError.of(
-            lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True
-        )
+        equation = PredictionError.of(lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True)
     theta = equation.theta_of(fit.rows[output])
     seen = 0
     for (e, slope), u in zip(equation.linearised(theta), equation.u, strict=True):
@@ -126,4 +120,4 @@ def _coloured_variance(errors: list[np.ndarray], own: list[np.ndarray], order: i
         return np.zeros(len(own[0]))
     d = np.concatenate(([1.0], -solve_toeplitz(products[:-1], products[1:])))
     innovation = float(d @ products) / total
-    return innovation * sum(np.sum(lfilter([1.0], d, z[:, ::-1], axis=1) ** 2, axis=1) for z in own)
+    return innovation * np.sum([np.sum(divide(z[:, ::-1], d) ** 2, axis=1) for z in own], axis=0)

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import lfilter
 
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import estimate_arx
+from simgap.baselines.estimation.filters import divide, multiply
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import Gram, lagged_gram
 from simgap.baselines.estimation.levenberg import stable
@@ -34,21 +34,17 @@ def armax_starts(gram: Gram, orders: Orders, output: int, equation: PredictionEr
     length = max(orders.max_lag, min(length, equation.samples // (4 * sum(orders.nb.shape))))
     long = Orders.of(*orders.nb.shape, na=length, nb=length, nk=1)
     long_fit = estimate_arx(lagged_gram(gram.experiments, gram.shift, length), long)
-    errors = [
-        _errors_of(long_fit, u, y, output, gram.max_lag, equation.nc) for u, y in stack(gram.experiments)
-    ]
+    errors = [_errors_of(long_fit, u, y, output, gram.max_lag, equation.nc) for u, y in stack(gram.experiments)]
     yield equation.pseudo_linear(errors)
 
 
-def _errors_of(
-    fit: LinearFit, u: np.ndarray, y: np.ndarray, output: int, skip: int, before: int
-) -> np.ndarray:
+def _errors_of(fit: LinearFit, u: np.ndarray, y: np.ndarray, output: int, skip: int, before: int) -> np.ndarray:
     """[B, before + T - skip]: one-step errors of one output, zero where they are not known."""
     model = fit.polynomial
     e = np.zeros((y.shape[0], before + y.shape[1] - skip))
     signals = np.concatenate((y - model.y_mean, u - model.u_mean), axis=2)
     taps = np.concatenate((model.a, -model.b), axis=2)[:, output]  # [N1, S]
-    known = sum(lfilter(taps[:, s], [1.0], signals[:, :, s], axis=1) for s in range(signals.shape[2]))
+    known = np.sum([multiply(taps[:, s], signals[:, :, s]) for s in range(signals.shape[2])], axis=0)
     e[:, before + model.order - skip :] = known[:, model.order :]
     return e
 
@@ -68,15 +64,12 @@ def oe_starts(
         model = estimate_arx(lagged_gram(own, shift[kept], length), long).polynomial
         if np.abs(model.poles).max() < 1:
             smooth = [
-                Experiment(e.name, e.u[length:], model.simulate(e.u[None], e.y[None, :length])[0], e.dt)
-                for e in own
+                Experiment(e.name, e.u[length:], model.simulate(e.u[None], e.y[None, :length])[0], e.dt) for e in own
             ]
             yield from _prefiltered(smooth, shift[kept], equation)
 
 
-def _prefiltered(
-    experiments: Sequence[Experiment], shift: np.ndarray, equation: OutputError
-) -> Iterator[np.ndarray]:
+def _prefiltered(experiments: Sequence[Experiment], shift: np.ndarray, equation: OutputError) -> Iterator[np.ndarray]:
     """theta of ARX fits to u/F and y/F, with F from the fit before."""
     nf = max(equation.nf[j] for j in equation.used)
     arx = Orders.of(1, len(equation.nb), na=nf, nb=[list(equation.nb)], nk=[list(equation.nk)])
@@ -95,7 +88,5 @@ def _prefiltered(
 
 def _divided(experiment: Experiment, shift: np.ndarray, f: np.ndarray) -> Experiment:
     """The experiment with every signal filtered by 1/F."""
-    y, u = (
-        lfilter([1.0], f, signal, axis=0) for signal in (experiment.y - shift[0], experiment.u - shift[1:])
-    )
+    y, u = (divide(signal, f, axis=0) for signal in (experiment.y - shift[0], experiment.u - shift[1:]))
     return Experiment(experiment.name, u, y, experiment.dt)

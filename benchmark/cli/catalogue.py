@@ -45,9 +45,7 @@ def _models() -> list[dict[str, str]]:
     entries = []
     for name in MODELS:
         missing = MODELS.why_missing(name)
-        entries.append(
-            {"name": name, "title": "" if missing else _first_line(MODELS[name]), "missing": missing}
-        )
+        entries.append({"name": name, "title": "" if missing else _first_line(MODELS[name]), "missing": missing})
     return entries
 
 

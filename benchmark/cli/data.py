@@ -56,6 +56,4 @@ def check(
     for role in ("inputs", "outputs"):
         for channel in described[role]:
             low, high, unit = channel["low"], channel["high"], channel["unit"]
-            typer.echo(
-                f"  {role[:-1]:6} {channel['name']}: {low:.4g} to {high:.4g} {unit} ({channel['kind']})"
-            )
+            typer.echo(f"  {role[:-1]:6} {channel['name']}: {low:.4g} to {high:.4g} {unit} ({channel['kind']})")

@@ -72,9 +72,7 @@ def _scores(results: Sequence[Result]) -> rich.table.Table:
 
     from simgap.reports.rendering import printable
 
-    table = Table(
-        "experiment", "output", title="Free-run simulation", title_justify="left", box=box.SIMPLE_HEAD
-    )
+    table = Table("experiment", "output", title="Free-run simulation", title_justify="left", box=box.SIMPLE_HEAD)
     for heading in ("RMSE", "fit %", "samples"):
         table.add_column(heading, justify="right")
     for result in results:

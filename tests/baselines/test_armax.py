@@ -42,9 +42,7 @@ def test_three_hundred_random_systems_are_identified_as_well_as_can_be():
         experiment, order, truth = random_system(rng)
         orders = Orders.of(1, 1, na=order, nb=order, nk=1, nc=order)
         row = estimate_armax([experiment], np.zeros(2), orders, constant=False).rows[0]
-        equation = PredictionError.of(
-            lagged_gram([experiment], np.zeros(2), order), orders, output=0, constant=False
-        )
+        equation = PredictionError.of(lagged_gram([experiment], np.zeros(2), order), orders, output=0, constant=False)
         at_truth, at_estimate = equation.cost(truth), equation.cost(row.values)
         assert row.converged
         assert at_estimate.squares <= at_truth.squares
@@ -61,9 +59,7 @@ def test_three_hundred_random_systems_are_identified_as_well_as_can_be():
 
 def test_the_gradient_is_the_slope_of_the_cost():
     rng = np.random.default_rng(1)
-    experiments = [
-        Experiment("e", rng.standard_normal((n, 2)), rng.standard_normal((n, 1)), 1.0) for n in (60, 60, 40)
-    ]
+    experiments = [Experiment("e", rng.standard_normal((n, 2)), rng.standard_normal((n, 1)), 1.0) for n in (60, 60, 40)]
     orders = Orders.of(1, 2, na=2, nb=2, nk=1, nc=2)
     equation = PredictionError.of(lagged_gram(experiments, np.zeros(3), 2), orders, 0, True)
     theta = np.array([-0.5, 0.2, 1.0, 0.5, 0.3, -1.0, 0.2, 0.6, 0.3])

@@ -43,9 +43,7 @@ def test_the_gram_matrix_is_that_of_the_stacked_regressors(seed, lengths, lags, 
     experiments = random_experiments(seed, lengths, ny=2, nu=1, level=level)
     shift = rough_means(experiments)
     gram = lagged_gram(experiments, shift, lags)
-    shifted = [
-        Experiment(e.name, e.u - shift[2:], e.y - shift[:2], 1.0) for e in experiments if len(e) > lags
-    ]
+    shifted = [Experiment(e.name, e.u - shift[2:], e.y - shift[:2], 1.0) for e in experiments if len(e) > lags]
     columns = [(s, k) for s in range(3) for k in range(lags + 1)]
     if not shifted:
         assert gram.rows == 0
@@ -86,10 +84,7 @@ def exact_solution(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Normal equations in rational arithmetic: no rounding at all."""
     columns = [[Fraction(float(v)) for v in column] for column in np.column_stack((x, y)).T]
     p = x.shape[1]
-    rows = [
-        [sum(a * b for a, b in zip(columns[i], columns[j], strict=True)) for j in range(p + 1)]
-        for i in range(p)
-    ]
+    rows = [[sum(a * b for a, b in zip(columns[i], columns[j], strict=True)) for j in range(p + 1)] for i in range(p)]
     for i in range(p):
         rows[i] = [v / rows[i][i] for v in rows[i]]
         for j in range(p):

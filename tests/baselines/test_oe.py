@@ -58,9 +58,7 @@ def test_with_free_starts_the_standard_errors_are_right():
 @given(seed=st.integers(0, 1000), n_start=st.sampled_from([None, 8, 20]))
 def test_the_gradient_is_the_slope_of_the_cost(seed, n_start):
     rng = np.random.default_rng(seed)
-    experiments = [
-        Experiment("e", rng.standard_normal((n, 2)), rng.standard_normal((n, 1)), 1.0) for n in (60, 60, 40)
-    ]
+    experiments = [Experiment("e", rng.standard_normal((n, 2)), rng.standard_normal((n, 1)), 1.0) for n in (60, 60, 40)]
     orders = Orders.of(1, 2, nb=2, nk=1, nf=[[2, 1]])
     equation = OutputError.of(experiments, np.zeros(3), orders, 0, True, n_start)
     theta = np.array([-0.5, 0.2, 1.0, 0.5, 0.3, -1.0, 0.2, 0.1])
@@ -96,8 +94,6 @@ def test_an_integrator_is_identified_without_leaving_the_unit_circle():
 
 def test_an_output_without_any_input_is_refused():
     rng = np.random.default_rng(5)
-    data = TrainingSet(
-        (Experiment("e", rng.standard_normal((50, 1)), rng.standard_normal((50, 2)), 1.0),), (), 5
-    )
+    data = TrainingSet((Experiment("e", rng.standard_normal((50, 1)), rng.standard_normal((50, 2)), 1.0),), (), 5)
     with pytest.raises(UnusableInput, match="no input acts on output 2"):
         Oe(nb=[[1], [0]], nf=1).fit(data, 0)

@@ -108,9 +108,7 @@ def test_arx_equals_plain_least_squares_to_nine_digits(name, problems):
 
 def test_an_offset_is_the_weight_of_a_constant_input_in_octave(arx_problem, arx_in_octave, measured):
     records = load("cascaded_tanks").training.train
-    with_ones = tuple(
-        Experiment(e.name, np.hstack((e.u, np.ones_like(e.u))), e.y, e.dt) for e in records
-    )
+    with_ones = tuple(Experiment(e.name, np.hstack((e.u, np.ones_like(e.u))), e.y, e.dt) for e in records)
     expected = arx_in_octave([arx_problem(with_ones, [4], [[4, 1]], 1)])[0][0]
     model = Arx(4, 4, 1)
     model.fit(TrainingSet(records, (), 20), 0)

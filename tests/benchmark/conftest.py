@@ -9,9 +9,7 @@ from simgap.data import save
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 MODELS = Path(__file__).parent / "example_models.py"
-CHANNELS = Channels(
-    (Channel("u", "V"),), (Channel("phi", "deg", "position"), Channel("omega", "deg/s", "velocity"))
-)
+CHANNELS = Channels((Channel("u", "V"),), (Channel("phi", "deg", "position"), Channel("omega", "deg/s", "velocity")))
 
 
 def _experiment(name: str, seed: int, length: int = 90) -> Experiment:
@@ -46,9 +44,7 @@ def suite(folder: Path, tmp_path: Path):
     def write(*models: str, timeout: float = 60, seeds: int = 1, datasets: str = '["noise"]') -> str:
         path = tmp_path / "mine.toml"
         tables = "".join(f'[[models]]\nname = "{MODELS.as_posix()}:{model}"\n' for model in models)
-        path.write_text(
-            f'title = "Mine"\ndatasets = {datasets}\ntimeout = {timeout}\nseeds = {seeds}\n{tables}'
-        )
+        path.write_text(f'title = "Mine"\ndatasets = {datasets}\ntimeout = {timeout}\nseeds = {seeds}\n{tables}')
         return str(path)
 
     return write

@@ -65,9 +65,7 @@ def test_lists_are_printed_and_written_for_machines(capsys, tmp_path, kind):
 
 
 def test_run_shows_each_job_and_the_overview_and_writes_json(capsys, tmp_path, suite):
-    code, out, err = run(
-        capsys, "run", suite("Mean", "IsNaN"), "--out", tmp_path / "out", "--json", tmp_path / "j"
-    )
+    code, out, err = run(capsys, "run", suite("Mean", "IsNaN"), "--out", tmp_path / "out", "--json", tmp_path / "j")
     assert (code, err) == (0, "")
     assert "[1/2] Mean on noise, seed 0: fitted in" in out
     assert "Free-run fit in percent" in out

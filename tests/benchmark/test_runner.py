@@ -175,9 +175,7 @@ def test_missing_data_of_a_suite_are_noted_and_missing_data_of_the_user_refused(
 def test_a_script_without_a_main_guard_runs_once(suite, tmp_path):
     script = tmp_path / "script.py"
     out = str(tmp_path / "out")
-    script.write_text(
-        f"import numpy, simgap\nprint('here')\nprint(len(simgap.run({suite('Mean')!r}, out={out!r})))\n"
-    )
+    script.write_text(f"import numpy, simgap\nprint('here')\nprint(len(simgap.run({suite('Mean')!r}, out={out!r})))\n")
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.split() == ["here", "4"]
     assert done.stderr == ""

@@ -97,9 +97,7 @@ def test_a_bad_line_is_refused_with_file_and_line(tmp_path, change, complaint):
     assert complaint in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    "name", ["../../etc/passwd", "a/b\\c", "..", "C:x", ".hidden", "ARX(3,2,1)", "", "x\n"]
-)
+@pytest.mark.parametrize("name", ["../../etc/passwd", "a/b\\c", "..", "C:x", ".hidden", "ARX(3,2,1)", "", "x\n"])
 def test_no_model_name_leaves_the_suite_folder(tmp_path, name):
     path = store.path_of(tmp_path, name, name)
     assert path.resolve().parent.parent == tmp_path.resolve()

@@ -26,16 +26,12 @@ def test_the_unbroken_file_loads(tmp_path):
     assert np.array_equal(data.training.train[0].y[:, 0], [k % 5 for k in range(12)])
 
 
-@pytest.mark.parametrize(
-    "cell", ["", "  ", "nan", "NaN", "NA", "inf", "-Infinity", "1e999", "1e101", "-1e200"]
-)
+@pytest.mark.parametrize("cell", ["", "  ", "nan", "NaN", "NA", "inf", "-Infinity", "1e999", "1e101", "-1e200"])
 def test_a_cell_that_is_no_measurement_is_named(refused_cell, cell):
     refused_cell(with_row(7, f"0.5,{cell},1\n"), row=7, column="u")
 
 
-@pytest.mark.parametrize(
-    "cell", ["abc", "1_000", "0x10", "1,5".replace(",", "·"), "١٢", "1 2", "--1", "1e", "True"]
-)
+@pytest.mark.parametrize("cell", ["abc", "1_000", "0x10", "1,5".replace(",", "·"), "١٢", "1 2", "--1", "1e", "True"])
 def test_text_in_a_number_column_is_named(refused_cell, cell):
     assert "not a number" in refused_cell(with_row(7, f"0.5,1,{cell}\n"), row=7, column="phi")
 

@@ -27,9 +27,7 @@ def test_a_folder_is_read_as_it_describes_itself(good):
         "003",
     ]
     first_row = (good / "train" / "000.csv").read_text().splitlines()[1].split(",")
-    assert [data.training.train[0].u[0, 0], data.training.train[0].y[0, 0]] == [
-        float(x) for x in first_row[1:]
-    ]
+    assert [data.training.train[0].u[0, 0], data.training.train[0].y[0, 0]] == [float(x) for x in first_row[1:]]
 
 
 def test_without_valid_the_last_quarter_of_each_training_experiment_validates(good):
@@ -176,9 +174,7 @@ def test_a_missing_column_in_one_of_many_files_is_found(good, refused):
 
 def test_time_is_checked_against_the_declared_sampling_time(good, refused):
     edit(good, "sampling_time = 0.1 ", "sampling_time = 0.2 ")
-    assert "000.csv: row 3, column 't': time goes from 0 to 0.1 s where a step of 0.2 s is due" in refused(
-        good
-    )
+    assert "000.csv: row 3, column 't': time goes from 0 to 0.1 s where a step of 0.2 s is due" in refused(good)
 
 
 def test_an_input_that_moves_between_but_not_within_experiments_is_accepted(good):

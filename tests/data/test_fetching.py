@@ -62,9 +62,7 @@ def test_a_daisy_set_is_fetched_once_and_then_loads(site, no_files):
 )
 def test_a_failed_download_leaves_nothing_and_says_where_to_get_it_by_hand(site, no_files, answer):
     site.answer = answer
-    with pytest.raises(
-        UnusableInput, match=r"daisy_ballbeam could not be downloaded .* by hand from"
-    ) as caught:
+    with pytest.raises(UnusableInput, match=r"daisy_ballbeam could not be downloaded .* by hand from") as caught:
         fetch("daisy_ballbeam")
     assert len(str(caught.value).splitlines()) == 1
     assert str(no_files / "daisy") in str(caught.value)

@@ -127,9 +127,7 @@ def test_halving_the_step_moves_all_effects_together_by_less_than_a_hundredth_of
 
 
 def test_the_back_emf_and_the_gear_enter_the_damping_and_the_inertia():
-    p = Gimbal(
-        gear=2.0, torque_constant=0.5, resistance=4.0, viscous=0.1, yaw_inertia=0.03, motor_inertia=0.001
-    )
+    p = Gimbal(gear=2.0, torque_constant=0.5, resistance=4.0, viscous=0.1, yaw_inertia=0.03, motor_inertia=0.001)
     assert p.inertia == pytest.approx(0.034)
     assert p.torque_per_volt == pytest.approx(0.25)
     assert p.damping == pytest.approx(0.35)

@@ -103,9 +103,7 @@ def test_the_silverbox_tests_are_told_apart_by_position(raw):
     assert list(tests) == ["multisine", "arrow_full", "arrow_no_extrapolation"]
     assert np.array_equal(tests["arrow_full"], file["V2"][100:40575])
     assert np.array_equal(tests["arrow_no_extrapolation"], file["V2"][100:32100])
-    assert np.array_equal(
-        flat([*data.training.train, *data.training.valid, data.test[0]]), file["V2"][40650:127400]
-    )
+    assert np.array_equal(flat([*data.training.train, *data.training.valid, data.test[0]]), file["V2"][40650:127400])
     assert data.training.dt == pytest.approx(1 / 610.35, rel=1e-12)
 
 
@@ -163,9 +161,7 @@ def made(no_files):
     ):
         record = {"Force": rng.normal(size=(1, 300)), "Voltage": rng.normal(size=(1, 300)), "Fs": 400.0}
         savemat(inside / f"F16Data_{stem}.mat", record | {"Acceleration": rng.normal(size=(3, 300))})
-    savemat(
-        inside / "F16Data_SpecialOddMSine_Level1.mat", record | {"Acceleration": rng.normal(size=(3, 300))}
-    )
+    savemat(inside / "F16Data_SpecialOddMSine_Level1.mat", record | {"Acceleration": rng.normal(size=(3, 300))})
     return folder
 
 

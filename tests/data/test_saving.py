@@ -94,8 +94,6 @@ def test_a_channel_that_cannot_be_a_column_is_refused_before_anything_is_written
 
 def test_a_data_set_without_validation_cannot_be_expressed(tmp_path):
     data = dataset_of(random_tables())
-    bare = Dataset(
-        "bare", TrainingSet(data.training.train, (), 2, data.channels), data.test, 2, data.channels
-    )
+    bare = Dataset("bare", TrainingSet(data.training.train, (), 2, data.channels), data.test, 2, data.channels)
     with pytest.raises(UnusableInput, match="no validation experiments"):
         save(bare, tmp_path / "set")

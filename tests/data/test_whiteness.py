@@ -68,9 +68,7 @@ def test_the_verdict_is_one_sentence_with_its_numbers():
     assert "p < 0.001" in failed
 
 
-@pytest.mark.parametrize(
-    ("u", "max_lag"), [(np.full(50, 0.1), 20), (np.arange(20.0), 20), (np.arange(20.0), 0)]
-)
+@pytest.mark.parametrize(("u", "max_lag"), [(np.full(50, 0.1), 20), (np.arange(20.0), 20), (np.arange(20.0), 0)])
 def test_an_input_without_an_autocorrelation_is_refused_with_what_to_do(u, max_lag):
     with pytest.raises(UnusableInput, match=r"; (excite|ask)"):
         whiteness(u, max_lag)

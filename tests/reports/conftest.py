@@ -47,10 +47,6 @@ def results(make_row):
         make_row("arx", "first", 1.0, n_params=4, fit_seconds=0.25),
         make_row("arx", "second", 0.5, n_params=4, fit_seconds=0.25),
         _row("arx", "first", "forecast", forecast, n_params=4, fit_seconds=0.25),
-        make_row(
-            "gru", "first", math.inf, status="error", message="fit raised MemoryError: [x] (gru.py, line 3)"
-        ),
-        make_row(
-            "gru", "second", math.inf, status="error", message="fit raised MemoryError: [x] (gru.py, line 3)"
-        ),
+        make_row("gru", "first", math.inf, status="error", message="fit raised MemoryError: [x] (gru.py, line 3)"),
+        make_row("gru", "second", math.inf, status="error", message="fit raised MemoryError: [x] (gru.py, line 3)"),
     ]

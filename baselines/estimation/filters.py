@@ -1,0 +1,18 @@
+"""Polynomials in the delay q^-1 applied to signals, from rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+
+def multiply(b: np.ndarray | Sequence[float], signal: np.ndarray, axis: int = -1) -> np.ndarray:
+    """B(q) x: y(t) = sum_k b_k x(t-k)."""
+    return np.asarray(lfilter(b, [1.0], signal, axis=axis))
+
+
+def divide(signal: np.ndarray, f: np.ndarray | Sequence[float], axis: int = -1) -> np.ndarray:
+    """x / F(q) with F monic: y(t) = x(t) - sum_k f_k y(t-k)."""
+    return np.asarray(lfilter([1.0], f, signal, axis=axis))
