@@ -21,9 +21,10 @@ INSTALLED := $(VENV)/installed-$(VERSION)
 
 help:
 	@echo "make benchmark   all models on all data sets at hand, as tables in the terminal and in results/"
-	@echo "make test        the tests; make test-slow for those that take minutes"
+	@echo "make test        the tests; make test-slow for those that take minutes, with make peers"
 	@echo "make lint        format, style and types; make dev sets up .venv and stops"
-	@echo "make speed       times, beside other tools after make peers"
+	@echo "make speed       times beside those of other tools, with make peers"
+	@echo "make peers       those other tools into .venv"
 	@echo "make lock        newer versions into the lock files, with Python 3.11"
 	@echo "make clean       remove what was built, .venv included; results/ stays"
 
@@ -52,17 +53,20 @@ test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
 	@$(BIN)/python -m pytest -q -m "not slow"
 
-test-slow: $(INSTALLED)
+test-slow: peers
 	@$(BIN)/python -m pytest -q -m slow
 
-# After an interruption, or with one more model, only what is not in results/ yet is run.
+# After an interruption, or with one more model, only what is not in results/ yet is run. A failed job (1) is a row of
+# the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.
 benchmark: $(INSTALLED)
 	@[ ! -d results ] || echo "Carrying on in results/; delete it to run every job anew."
-	@failed=0; $(BIN)/simgap run full --jobs $(JOBS) --out results || failed=$$?; \
+	@[ -t 1 ] || export COLUMNS=200; failed=0; $(BIN)/simgap run full --jobs $(JOBS) --out results || failed=$$?; \
 	  [ $$failed -gt 1 ] || $(BIN)/simgap report results; exit $$failed
 
-speed: $(INSTALLED)
-	@$(BIN)/python -m pytest -q tests/speed
+# Without the conftest.py above it, whose checks of shapes would be timed along.
+speed: peers
+	@$(BIN)/python -m pytest -q tests/speed --confcutdir=tests/speed \
+	  -o 'python_files=bench_*.py' -o 'python_functions=bench_*'
 
 # pyright finds the mapped name only in an installed copy; sed turns its paths back into ours.
 lint: $(INSTALLED)

@@ -102,7 +102,7 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         fitted=fitted if isinstance(fitted, dict) else {"fitted": fitted},
         n_params=int(n_params) if isinstance(n_params, int | np.integer) else None,
         fit_seconds=seconds,
-        message="; ".join(dict.fromkeys(f"{w.category.__name__}: {w.message}" for w in caught)),
+        message="; ".join(dict.fromkeys(str(w.message) for w in caught)),
     )
 
 

@@ -1,1 +1,1 @@
-
+"""Neural models, one file each, found by their decorator; none yet."""

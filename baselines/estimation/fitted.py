@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,10 +13,6 @@ from simgap.baselines.estimation.levenberg import Minimum
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.records import Experiment
-
-
-class IdentificationWarning(UserWarning):
-    """The model was identified, but the reader should know something before trusting it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +43,7 @@ class Row:
 
     @property
     def standard_errors(self) -> Float[np.ndarray, " p"]:
+        """One standard deviation of each estimate."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
@@ -79,39 +75,32 @@ class LinearFit:
         variances = [row.variance * max(1 - len(row.values) / self.samples, 1e-9) for row in self.rows]
         return float(self.samples * np.sum(np.log(np.maximum(variances, 1e-300)))) + penalty * self.n_params
 
-    def warn(self) -> None:
-        """Say why, where the data do not excite the model, the search did not end, or the model is unstable."""
+    def complaints(self) -> list[str]:
+        """What a reader must know before trusting the model: why its coefficients or its free run may be useless."""
+        found = []
         if not all(row.converged for row in self.rows):
-            warnings.warn(
-                "the search stopped before the error was at its minimum; try a lower order",
-                IdentificationWarning,
-                stacklevel=2,
+            found.append("the search stopped before the error was at its minimum; try a lower order")
+        weak = next((row for row in self.rows if row.rank < len(row.values)), None)
+        if weak:
+            found.append(
+                f"only {weak.rank} of {len(weak.values)} coefficients can be told apart: the input does not excite the "
+                f"rest, or the order is higher than the data ask for; lower it or use a richer input"
             )
-        for row in self.rows:
-            if row.rank < len(row.values):
-                warnings.warn(
-                    f"only {row.rank} of {len(row.values)} coefficients can be told apart: the input does not excite "
-                    f"the rest, or the order is higher than the data ask for; lower it or use a richer input",
-                    IdentificationWarning,
-                    stacklevel=2,
-                )
-                break
         radius = float(np.abs(self.polynomial.poles).max(initial=0.0))
-        # Integrators are identified as poles at 1 give or take rounding and noise; they grow like time, not like e^t.
+        # Integrators are identified as poles at 1 give or take noise; they grow like t, not exponentially.
         if radius > 1 + 1e-3:
             tenfold = self.polynomial.dt * np.log(10) / np.log(radius)
-            warnings.warn(
+            found.append(
                 f"the identified model is unstable: a pole of magnitude {radius:.4g} makes a free run grow tenfold "
-                f"every {tenfold:.3g} s; try another order, simulation error (oe), or data without feedback",
-                IdentificationWarning,
-                stacklevel=2,
+                f"every {tenfold:.3g} s; try another order, simulation error (oe), or data without feedback"
             )
+        return found
 
-    def table(self) -> str:
-        """Every coefficient with its standard error."""
+    def table(self, outputs: Sequence[str]) -> str:
+        """Every coefficient with its standard error, under the names of the outputs."""
         lines = []
-        for output, row in enumerate(self.rows):
-            lines.append(f"output {output + 1}: residual standard deviation {np.sqrt(row.variance):.4g}")
+        for output, row in zip(outputs, self.rows, strict=True):
+            lines.append(f"{output}: residual standard deviation {np.sqrt(row.variance):.4g}")
             for name, value, error in zip(row.names, row.values, row.standard_errors, strict=True):
                 lines.append(f"  {name:<8} {value:>12.6g} +- {error:.2g}")
         return "\n".join(lines)

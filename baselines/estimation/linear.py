@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
@@ -19,6 +20,10 @@ from simgap.records import Experiment, TrainingSet, UnusableInput
 Criterion = Literal["valid", "aic", "bic"]
 # From orders, and a fit to begin the search at where there is one, to a fit.
 Estimator = Callable[[Orders, LinearFit | None], LinearFit]
+
+
+class IdentificationWarning(UserWarning):
+    """The model was identified, but the reader should know something before trusting it."""
 
 
 class LinearModel(ABC):
@@ -54,8 +59,9 @@ class LinearModel(ABC):
             orders, start = self._selected(data, self.candidates(ny, nu))
         everything = data.train + data.valid
         self.result = self.estimator(everything, data.n_init, orders.max_lag)(orders, start)
-        self._seen = everything
-        self.result.warn()
+        self._data = data
+        for complaint in self.result.complaints():
+            warnings.warn(complaint, IdentificationWarning, stacklevel=2)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -81,9 +87,11 @@ class LinearModel(ABC):
     def summary(self) -> str:
         """Coefficients with standard errors, poles, and the residual analysis."""
         poles = ", ".join(f"{pole:.4g}" for pole in sorted(self.polynomial.poles, key=abs, reverse=True)[:8])
-        tests = residual_analysis(self.result, self._seen)
-        lines = [f"output {i + 1}: {found.text()}" for i, row in enumerate(tests) for found in row]
-        return "\n".join((self.result.table(), f"poles of the simulation: {poles}", *lines))
+        outputs = [channel.name for channel in self._data.channels.outputs]
+        inputs = [channel.name for channel in self._data.channels.inputs]
+        tests = residual_analysis(self.result, self._data.train + self._data.valid, inputs)
+        lines = [f"{name}: {found.text()}" for name, row in zip(outputs, tests, strict=True) for found in row]
+        return "\n".join((self.result.table(outputs), f"poles of the simulation: {poles}", *lines))
 
     def _selected(self, data: TrainingSet, candidates: list[Orders]) -> tuple[Orders, LinearFit]:
         """The chosen candidate and its fit, at which the final estimation begins.
@@ -129,6 +137,8 @@ def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_i
     best = int(np.argmin(errors.mean(axis=1)))
     if not np.isfinite(errors[best]).all():
         return min(fits, key=lambda fit: fit.n_params)
+    if errors.shape[1] == 1:  # nothing tells what chance is
+        return fits[best]
     with np.errstate(over="ignore", invalid="ignore"):  # a fit that diverged has huge or infinite errors
         worse = errors - errors[best]
         chance = worse.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])

@@ -35,6 +35,7 @@ class Correlation:
         return self.lags[np.abs(self.values) > self.bounds]
 
     def text(self) -> str:
+        """How many lags are outside, which, and how many chance would put there."""
         expected = 0.05 * len(self.lags)
         found = ", ".join(map(str, self.outside[:8])) + (", .." if len(self.outside) > 8 else "")
         return (
@@ -43,28 +44,30 @@ class Correlation:
         )
 
 
-def residual_analysis(fit: LinearFit, experiments: Sequence[Experiment], max_lag: int = 25) -> list[list[Correlation]]:
+def residual_analysis(
+    fit: LinearFit, experiments: Sequence[Experiment], inputs: Sequence[str], max_lag: int = 25
+) -> list[list[Correlation]]:
     """For each output: the residual with its own past, lags 1..L, then with each input, lags -L..L.
 
-    A correlation at negative lags means feedback. The bounds are 1.96 standard deviations under the hypothesis that
-    the model is right, with what the estimated parameters take away (Box and Pierce 1970) projected out,
+    `inputs` are their names, for the texts. A correlation at negative lags means feedback. The bounds are 1.96
+    standard deviations if the model is right, less what the estimated parameters take away (Box and Pierce 1970),
 
         r(tau) = z' e / (|z| |e|),   var z' e = z' M R_e M z,   M = 1 - psi (psi' psi)^-1 psi',
 
     for z(t) = u(t - tau) or e(t - tau) and psi the slopes of the errors (Ljung 1999, section 16.6). The plain 1/N is
     too wide at small lags, and wrong where residual and input are both coloured.
     """
-    return [_of_output(fit, experiments, i, max_lag) for i in range(len(fit.rows))]
+    return [_of_output(fit, experiments, i, inputs, max_lag) for i in range(len(fit.rows))]
 
 
-def _of_output(fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int) -> list[Correlation]:
+def _of_output(
+    fit: LinearFit, experiments: Sequence[Experiment], output: int, inputs: Sequence[str], max_lag: int
+) -> list[Correlation]:
     pieces = list(_aligned(fit, experiments, output, max_lag))
-    nu = fit.orders.nb.shape[1]
     own = range(1, max_lag + 1)
     both = range(-max_lag, max_lag + 1)
     found = [_correlate("its own past", pieces, own, lambda e, u: e, white=True)]
-    for j in range(nu):
-        name = "the input" if nu == 1 else f"input {j + 1}"
+    for j, name in enumerate(inputs):
         found.append(_correlate(name, pieces, both, lambda e, u, j=j: u[:, j], white=False))
     return found
 

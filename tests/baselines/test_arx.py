@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from simgap.baselines.arx import Arx
-from simgap.baselines.estimation.fitted import IdentificationWarning
+from simgap.baselines.estimation.linear import IdentificationWarning
 from simgap.baselines.fir import Fir
 from simgap.records import Experiment, TrainingSet, UnusableInput
 

@@ -28,7 +28,7 @@ def test_one_lag_in_twenty_is_outside_when_the_arx_model_is_right(smooth):
         model = Arx(1, 1)
         data = tuple(experiment(rng, noise_filter=(1, -0.8), smooth=smooth) for _ in range(2))
         model.fit(TrainingSet(data, (), 5), 0)
-        ((past, with_input),) = residual_analysis(model.result, data, max_lag=15)
+        ((past, with_input),) = residual_analysis(model.result, data, ["voltage"], max_lag=15)
         own.append(past)
         cross.append(with_input)
     assert 0.03 < rate_outside(own) < 0.07
@@ -42,7 +42,7 @@ def test_coloured_noise_and_a_coloured_input_raise_no_false_alarm():
         data = (experiment(rng, 1500, noise_filter=(1, -0.9), smooth=0.9),)
         model = Oe(1, 1, start="free")
         model.fit(TrainingSet(data, (), 5), 0)
-        ((_, with_input),) = residual_analysis(model.result, data, max_lag=15)
+        ((_, with_input),) = residual_analysis(model.result, data, ["voltage"], max_lag=15)
         cross.append(with_input)
         plain.append(np.mean(np.abs(with_input.values) > 1.96 / np.sqrt(1500)))
     assert rate_outside(cross) < 0.10
@@ -54,9 +54,9 @@ def test_missing_dynamics_show_at_their_lag():
     data = (experiment(rng, 2000, numerator=(0, 1.0, 0, 0, 0, 0.3)),)
     model = Arx(1, 1)
     model.fit(TrainingSet(data, (), 5), 0)
-    ((_, with_input),) = residual_analysis(model.result, data)
+    ((_, with_input),) = residual_analysis(model.result, data, ["voltage"])
     assert 5 in with_input.outside
-    assert "residual with the input" in with_input.text()
+    assert "residual with voltage" in with_input.text()
 
 
 def test_feedback_shows_at_negative_lags():
@@ -69,6 +69,6 @@ def test_feedback_shows_at_negative_lags():
     model = Arx(1, 1)
     data = (Experiment("e", u, y, 1.0),)
     model.fit(TrainingSet(data, (), 5), 0)
-    ((_, with_input),) = residual_analysis(model.result, data)
+    ((_, with_input),) = residual_analysis(model.result, data, ["voltage"])
     assert (with_input.outside < 0).sum() >= 1
     assert 0 in with_input.outside  # u(t) answers to e(t) at once

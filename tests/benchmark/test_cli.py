@@ -112,7 +112,7 @@ def test_fit_prints_what_was_chosen_the_summary_and_scores_with_units(capsys, tm
 
 
 def test_fit_prints_warnings_as_notes(capsys, folder, example):
-    assert "note: RuntimeWarning: badly conditioned" in run(capsys, "fit", example("Warns"), folder)[1]
+    assert "note: badly conditioned" in run(capsys, "fit", example("Warns"), folder)[1]
 
 
 @pytest.mark.parametrize("model", ["RaisesInFit", "RaisesInSimulate"])

@@ -1,0 +1,106 @@
+"""README.md does what it says: its blocks are run in a folder with the files that it names.
+
+A comment above a block says what the block is: `<!-- file NAME -->` is the content of a file, `<!-- not run -->` is for
+make, which would run these tests again. Other blocks of sh and python are run as they stand.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(
+    r"(?:^<!-- (?P<mark>[^\n]*) -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+)
+
+
+class Block(NamedTuple):
+    mark: str | None
+    language: str
+    text: str
+
+
+BLOCKS = [Block(*match.groups()) for match in BLOCK.finditer((ROOT / "README.md").read_text(encoding="utf-8"))]
+FILES = {mark.removeprefix("file "): text for mark, _, text in BLOCKS if mark and mark.startswith("file ")}
+
+
+def to_run(language: str) -> list[str]:
+    return [text for mark, found, text in BLOCKS if found == language and mark is None]
+
+
+def write_record(path: Path, output: str, seed: int, samples: int = 300) -> None:
+    """A first-order plant under a random square wave."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], size=samples // 10), 10)
+    y = np.zeros(samples)
+    for t in range(1, samples):
+        y[t] = 0.9 * y[t - 1] + 0.2 * u[t - 1]
+    columns = np.column_stack((0.1 * np.arange(samples), u, y + rng.normal(scale=0.02, size=samples)))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(path, columns, fmt="%.6g", delimiter=",", header=f"t,u,{output}", comments="")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """The reader's folder: a CSV file, a folder of experiments, and every file that the README shows."""
+    write_record(tmp_path / "my.csv", "y", 0, 600)
+    for seed, split in enumerate(("train", "train", "valid", "test")):
+        write_record(tmp_path / "my_data" / split / f"{seed}.csv", "phi", seed)
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def run(folder: Path, *command: str) -> str:
+    """What a command prints; it must end well and have nothing to complain about."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    done = subprocess.run(
+        command, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, check=False, timeout=300
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    return done.stdout
+
+
+@pytest.mark.parametrize("script", to_run("sh"))
+def test_its_commands_run(script, folder):
+    assert run(folder, "bash", "-euo", "pipefail", "-c", script)
+
+
+@pytest.mark.parametrize("script", to_run("python"))
+def test_its_python_runs(script, folder):
+    assert "# Leaderboard" in run(folder, sys.executable, "-W", "error", "-c", script)
+
+
+def test_its_model_in_baselines_is_registered_by_that_one_file(folder):
+    script = (
+        "import sys, simgap.baselines; simgap.baselines.__path__.append('baselines');"
+        "from simgap.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    arguments = ["fit", "static_gain", "my.csv", "--input", "u", "--output", "y"]
+    assert "static_gain on my" in run(folder, sys.executable, "-W", "error", "-c", script, *arguments)
+
+
+def test_what_is_not_run_is_make():
+    lines = [line for mark, _, text in BLOCKS if mark == "not run" for line in text.splitlines()]
+    assert lines
+    assert all(line.startswith("make ") for line in lines)
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("**/README.md")), ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_make_target_it_names_exists(page):
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    named = re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(named) <= set(targets)
+
+
+def test_its_folders_exist():
+    rows = re.findall(r"^\| `([a-z]+)/` \|", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(rows) == 6
+    assert all((ROOT / folder / "README.md").is_file() for folder in rows)

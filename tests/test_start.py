@@ -1,0 +1,28 @@
+"""`import simgap` and what only lists names load little: no model, no torch."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"control", "jaxtyping", "numba", "numpy", "pandas", "rich", "scipy", "torch", "typer"}
+COMMAND = "import sys; from simgap.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+def test_import_simgap_loads_nothing_heavy():
+    code = "import sys, simgap; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
+    assert not HEAVY & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("arguments", ["", "--help", "--version", "list models", "list datasets", "list suites"])
+def test_a_command_that_fits_nothing_does_not_import_torch(arguments, tmp_path):
+    # Nothing catches this, whereas an ImportError could be taken for a missing dependency.
+    (tmp_path / "torch.py").write_text("import os\nos._exit(77)\n")
+    command = [sys.executable, "-W", "error", "-c", COMMAND, *arguments.split()]
+    done = subprocess.run(
+        command, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout
