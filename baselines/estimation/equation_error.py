@@ -55,7 +55,7 @@ def assemble(
             else:
                 b[lag, i, signal - ny] = value
         c[: len(noise[i]), i, i] = noise[i]
-    y_mean, u_mean = moved_operating_point(a, b, constants, gram.experiments, gram.shift)
+    y_mean, u_mean = moved_operating_point(a, b, constants, gram.shift, gram.spread)
     polynomial = Polynomial(a, b, c, u_mean, y_mean, gram.experiments[0].dt)
     return LinearFit(polynomial, orders, rows, constants, gram.rows)
 

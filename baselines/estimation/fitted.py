@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.estimation.gram import thin_sample
 from simgap.baselines.estimation.levenberg import Minimum
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
-from simgap.records import Experiment
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,19 +108,17 @@ def moved_operating_point(
     a: Float[np.ndarray, "N1 ny ny"],
     b: Float[np.ndarray, "N1 ny nu"],
     constant: Float[np.ndarray, " ny"],
-    experiments: Sequence[Experiment],
     shift: Float[np.ndarray, " S"],
+    spread: Float[np.ndarray, " S"],
 ) -> tuple[Float[np.ndarray, " ny"], Float[np.ndarray, " nu"]]:
     """y_mean and u_mean that express A(q) (y - y_0) = B(q) (u - u_0) + constant without the constant.
 
-    The smallest move, in standard deviations of the signals, with A(1) dy - B(1) du = constant; it exists for an
+    The smallest move from `shift`, in units of `spread`, with A(1) dy - B(1) du = constant; it exists for an
     integrator, too, where A(1) = 0.
     """
     ny = a.shape[1]
     if not constant.any():
         return shift[:ny], shift[ny:]
-    spread = thin_sample(experiments).std(axis=0)
-    spread[spread == 0] = 1.0
     gains = np.hstack((a.sum(axis=0), -b.sum(axis=0))) * spread  # [ny, ny + nu]
     moved = shift + spread * (np.linalg.pinv(gains) @ constant)
     return moved[:ny], moved[ny:]

@@ -42,6 +42,12 @@ class Gram:
         """L, the largest lag; every sum starts at sample L of its experiment."""
         return self.products.shape[1] - 1
 
+    @property
+    def spread(self) -> Float[np.ndarray, " S"]:
+        """The root mean square of each signal about its shift, 1 for one that never moves."""
+        squares = np.einsum("iaia->ia", self.products)[:, 0] / max(self.rows, 1)
+        return np.sqrt(np.where(squares > 0, squares, 1.0))
+
     def chunks(self) -> Iterator[Float[np.ndarray, "S n"]]:
         """The shifted signals piece by piece, each with the L samples before it; one is gone when the next comes."""
         for experiment in self.experiments:
@@ -55,13 +61,8 @@ def rough_means(experiments: Sequence[Experiment], offset: bool = True) -> Float
     """
     if not offset:
         return np.zeros(experiments[0].y.shape[1] + experiments[0].u.shape[1])
-    return thin_sample(experiments).mean(axis=0)
-
-
-def thin_sample(experiments: Sequence[Experiment]) -> Float[np.ndarray, "n S"]:
-    """About a thousand samples of all signals, spread evenly."""
     step = max(1, sum(map(len, experiments)) // 1000)
-    return np.concatenate([np.hstack((e.y[::step], e.u[::step])) for e in experiments])
+    return np.concatenate([np.hstack((e.y[::step], e.u[::step])) for e in experiments]).mean(axis=0)
 
 
 def lagged_gram(experiments: Sequence[Experiment], shift: Float[np.ndarray, " S"], max_lag: int) -> Gram:

@@ -117,9 +117,9 @@ class ArmaxRecord:
         a, b, c = np.split(theta, [self.na, self.na + self.nb])
         return np.r_[1.0, a], np.r_[0.0, b], np.r_[1.0, c]
 
-    def cost_from_zero(self, theta: np.ndarray) -> float:
-        """sum e^2 with e = 0 before the first sample whose past is all measured; infinite where 1/C is unstable."""
-        e = self._errors(theta, max(self.na, self.nb, self.nc))
+    def cost_from_zero(self, theta: np.ndarray, skip: int = 0) -> float:
+        """sum e^2 with e = 0 before the first sample whose past is all measured, less the first `skip` of them."""
+        e = self._errors(theta, max(self.na, self.nb, self.nc))[skip:]
         return float(e @ e) if np.isfinite(e).all() else np.inf
 
     def cost(self, theta: np.ndarray) -> float:
@@ -156,10 +156,7 @@ def _random_armax(seed: int) -> ArmaxRecord:
     unseen, level = 500, (0.03, 0.1, 0.3, 1.0)[seed % 4]
     hold = int(rng.integers(1, 6)) if seed % 3 == 2 else 1
     length = unseen + samples
-    if seed % 3 == 0:
-        u = rng.normal(size=length)
-    else:
-        u = np.repeat(rng.choice([-1.0, 1.0], size=length), hold)[:length]
+    u = rng.normal(size=length) if seed % 3 == 0 else np.repeat(rng.choice([-1.0, 1.0], size=length), hold)[:length]
     e = rng.normal(size=length)
     signal, noise = lfilter(b, a, u), lfilter(c, a, e)
     sigma = level * signal.std() / noise.std()

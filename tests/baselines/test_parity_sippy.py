@@ -3,6 +3,7 @@
 import contextlib
 import io
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -35,23 +36,33 @@ def by_sippy(sippy, record, method: str) -> np.ndarray:
     return np.r_[a[1 : record.na + 1], b[: record.nb], inside[1:]]
 
 
-def best_of_sippy(sippy, record, cost) -> float:
-    return min(cost(by_sippy(sippy, record, method)) for method in METHODS)
+@pytest.fixture(scope="module")
+def excess(sippy, random_armax):
+    """How far our prediction error is above SIPPY's lowest, relative, for each definition of it; negative below."""
+
+    def compare(seed: int) -> tuple[float, float, float]:
+        record = random_armax(seed)
+        model = Armax(record.na, record.nb, record.nc, offset=False)
+        model.fit(record.training_set, 0)
+        theirs = [by_sippy(sippy, record, method) for method in METHODS]
+        costs = (record.cost, record.cost_from_zero, partial(record.cost_from_zero, skip=100))
+        above = [cost(model.result.rows[0].values) / min(map(cost, theirs)) - 1 for cost in costs]
+        return above[0], above[1], above[2]
+
+    return compare
 
 
-def excess(sippy, record) -> float:
-    """How far our prediction error is above SIPPY's lowest, relative; negative where it is below."""
-    model = Armax(record.na, record.nb, record.nc, offset=False)
-    model.fit(record.training_set, 0)
-    return record.cost(model.result.rows[0].values) / best_of_sippy(sippy, record, record.cost) - 1
-
-
-def test_sippy_never_finds_a_lower_prediction_error(sippy, random_armax):
-    above = {seed: excess(sippy, random_armax(seed)) for seed in range(12)}
-    assert max(above.values()) <= 1e-9, above
+def test_sippy_never_finds_a_lower_prediction_error(excess):
+    above = {seed: excess(seed)[0] for seed in range(12)}
+    assert max(above.values()) <= 0, above
 
 
 @pytest.mark.slow
-def test_sippy_never_finds_a_lower_prediction_error_on_300_systems(sippy, random_armax):
-    above = {seed: excess(sippy, random_armax(seed)) for seed in range(300)}
-    assert max(above.values()) <= 1e-9, above
+def test_sippy_never_finds_a_lower_prediction_error_on_300_systems(excess):
+    above, from_zero, later = np.array([excess(seed) for seed in range(300)]).T
+    assert above.max() <= 0
+    # Errors before the record taken as zero is what SIPPY's OPT minimises, so there it is below us by a hair, and by
+    # more where that untruth is large against the noise. Once it has died out, nobody is ahead by half a percent.
+    assert np.median(from_zero) < 1e-5
+    assert np.mean(from_zero < 1e-3) > 0.9
+    assert later.max() < 5e-3

@@ -6,7 +6,7 @@ from simgap.baselines.armax import Armax
 
 
 @pytest.mark.parametrize(("method", "limit"), [("OPT", 100), ("ILLS", None)])
-def bench_armax_next_to_sippy(method, limit, record, compare, sippy, timed):
+def test_armax_next_to_sippy(method, limit, record, compare, sippy, timed):
     data = record(10_000, c=(1.0, 0.5, 0.2))
     y, u = data.train[0].y[:, 0].copy(), data.train[0].u[:, 0].copy()
 

@@ -12,7 +12,7 @@ def fitted(data):
 
 
 @SAMPLES
-def bench_arx_next_to_octave(samples, record, compare, octave):
+def test_arx_next_to_octave(samples, record, compare, octave):
     data = record(samples)
     octave.load(data)
 
@@ -23,7 +23,7 @@ def bench_arx_next_to_octave(samples, record, compare, octave):
 
 
 @SAMPLES
-def bench_arx_next_to_sippy(samples, record, compare, sippy, timed):
+def test_arx_next_to_sippy(samples, record, compare, sippy, timed):
     data = record(samples)
     y, u = data.train[0].y[:, 0].copy(), data.train[0].u[:, 0].copy()
 
@@ -35,7 +35,7 @@ def bench_arx_next_to_sippy(samples, record, compare, sippy, timed):
 
 
 @SAMPLES
-def bench_arx_next_to_sysidentpy(samples, record, compare, sysidentpy, timed):
+def test_arx_next_to_sysidentpy(samples, record, compare, sysidentpy, timed):
     data = record(samples)
     y, u = data.train[0].y.copy(), data.train[0].u.copy()
 

@@ -5,7 +5,7 @@ import numpy as np
 from simgap.baselines.arx import Arx
 
 
-def bench_free_run_next_to_sysidentpy(record, compare, sysidentpy, timed):
+def test_free_run_next_to_sysidentpy(record, compare, sysidentpy, timed):
     data = record(100_000)
     y, u = data.train[0].y.copy(), data.train[0].u.copy()
     model, other = Arx(na=2, nb=2, nk=1), sysidentpy()

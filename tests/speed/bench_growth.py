@@ -62,14 +62,14 @@ def answer(script: str, *arguments: object, **environment: str):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak memory of a process is read from /proc")
-def bench_arx_memory_is_at_most_twice_that_of_the_data(note):
+def test_arx_memory_is_at_most_twice_that_of_the_data(note):
     memory = answer(FIT, 10_000_000, 1)["memory"]
     note(f"- ARX(2,2), 1e7 samples: peak memory {memory:.2f} times that of the data (limit 2)")
     assert memory <= 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak memory of a process is read from /proc")
-def bench_arx_time_grows_in_proportion_to_the_samples(note):
+def test_arx_time_grows_in_proportion_to_the_samples(note):
     lengths, rounds = (100_000, 1_000_000, 10_000_000), 3
     times = {length: [] for length in lengths}
     for _ in range(rounds):  # in turns, so that a noisy machine hits all lengths
@@ -81,7 +81,7 @@ def bench_arx_time_grows_in_proportion_to_the_samples(note):
     assert nanoseconds[10_000_000] <= 2 * nanoseconds[100_000]
 
 
-def bench_kernels_are_compiled_once(note, tmp_path):
+def test_kernels_are_compiled_once(note, tmp_path):
     cache = {"NUMBA_CACHE_DIR": str(tmp_path)}
     compiled, loaded = (answer(SIMULATE, **cache) for _ in range(2))
     note(f"- first free run of a process: {compiled:.1f} s where numba compiles, {loaded:.2f} s from its cache")
