@@ -60,8 +60,8 @@ def _dataset_of(table: Table, inputs: Sequence[str], outputs: Sequence[str], dt:
     for column_list, role in ((inputs, "inputs"), (outputs, "outputs")):
         if isinstance(column_list, str) or not column_list:
             raise UnusableInput(
-                f"{table.source}: name the columns that are {role}, as a list; "
-                f"the columns are {', '.join(map(repr, table.names[:20]))}"
+                f"{table.source}: say which columns are the {role} (--{role[:-1]} NAME, or {role}=[..] in Python); "
+                f"there are {', '.join(map(repr, table.names[:20]))}"
             )
     if dt is not None and not 0 < dt <= LARGEST_VALUE:
         raise UnusableInput(f"{table.source}: dt = {dt} must be a positive number of seconds, such as 0.1")

@@ -25,9 +25,20 @@ def describe(dataset: Dataset) -> dict[str, Any]:
         "sampling_time": training.dt,
         "n_init": dataset.n_init,
         "splits": {name: _split(experiments) for name, experiments in splits.items()},
-        "inputs": [_channel(channel, u[:, i]) for i, channel in enumerate(dataset.channels.inputs)],
+        "inputs": [
+            _channel(channel, u[:, i]) | {"white_experiments": _white([e.u[:, i] for e in training.train])}
+            for i, channel in enumerate(dataset.channels.inputs)
+        ],
         "outputs": [_channel(channel, y[:, i]) for i, channel in enumerate(dataset.channels.outputs)],
     }
+
+
+def _white(inputs: Sequence[np.ndarray]) -> int:
+    """In how many experiments the input passes for white noise; one that never moves does not."""
+    from simgap.data.whiteness import whiteness  # SciPy, which a listing does not need
+
+    moving = (u for u in inputs if len(u) > 1 and np.ptp(u) > 0)
+    return sum(whiteness(u, max_lag=min(20, len(u) - 1)).white for u in moving)
 
 
 def _split(experiments: Sequence[Experiment]) -> dict[str, Any]:

@@ -53,7 +53,7 @@ class Table:
         if found:
             why = f"names column {short(column)} {found} times; rename or remove all but one"
         else:
-            why = f"names no column {short(column)} but {short(list(self.names))}; correct one of them"
+            why = f"has no column {short(column)}; it has {short(list(self.names))}; correct one of them"
         raise UnusableInput(f"{header} {why}")
 
     def numbers(self, column: str) -> Float[np.ndarray, " T"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +16,9 @@ from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
 from simgap.records import Experiment, TrainingSet, UnusableInput
+
+if TYPE_CHECKING:
+    import control
 
 Criterion = Literal["valid", "aic", "bic"]
 # From orders, and a fit to begin the search at where there is one, to a fit.
@@ -83,6 +86,10 @@ class LinearModel(ABC):
     def fitted(self) -> dict[str, Any]:
         """The orders, as chosen or given."""
         return self.result.orders.as_dict()
+
+    def to_control(self) -> control.StateSpace:
+        """The model in python-control, for deviations from its operating point; see `Polynomial.to_control`."""
+        return self.polynomial.to_control()
 
     def summary(self) -> str:
         """Coefficients with standard errors, poles, and the residual analysis."""

@@ -56,4 +56,8 @@ def check(
     for role in ("inputs", "outputs"):
         for channel in described[role]:
             low, high, unit = channel["low"], channel["high"], channel["unit"]
-            typer.echo(f"  {role[:-1]:6} {channel['name']}: {low:.4g} to {high:.4g} {unit} ({channel['kind']})")
+            about = f"  {role[:-1]:6} {channel['name']}: {low:.4g} to {high:.4g} {unit} ({channel['kind']})"
+            if role == "inputs":
+                trained = described["splits"]["train"]["experiments"]
+                about += f", white in {channel['white_experiments']} of {trained} training experiments"
+            typer.echo(about)

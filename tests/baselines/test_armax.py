@@ -1,7 +1,6 @@
 """ARMAX: the prediction-error method, on systems whose truth is known."""
 
 import numpy as np
-import pytest
 from scipy.signal import lfilter
 
 from simgap.baselines.armax import Armax

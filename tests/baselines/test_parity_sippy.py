@@ -11,6 +11,8 @@ import pytest
 from simgap.baselines.armax import Armax
 
 METHODS = ("ILLS", "RLLS", "OPT")
+# Our search ends where a millionth of the variance of one sample may be left to gain, of 300 samples and more.
+EQUAL = 1e-8
 
 
 @pytest.fixture(scope="module")
@@ -54,13 +56,13 @@ def excess(sippy, random_armax):
 
 def test_sippy_never_finds_a_lower_prediction_error(excess):
     above = {seed: excess(seed)[0] for seed in range(12)}
-    assert max(above.values()) <= 0, above
+    assert max(above.values()) <= EQUAL, above
 
 
 @pytest.mark.slow
 def test_sippy_never_finds_a_lower_prediction_error_on_300_systems(excess):
     above, from_zero, later = np.array([excess(seed) for seed in range(300)]).T
-    assert above.max() <= 0
+    assert above.max() <= EQUAL
     # Errors before the record taken as zero is what SIPPY's OPT minimises, so there it is below us by a hair, and by
     # more where that untruth is large against the noise. Once it has died out, nobody is ahead by half a percent.
     assert np.median(from_zero) < 1e-5

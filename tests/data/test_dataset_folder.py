@@ -169,7 +169,7 @@ def test_a_bad_cell_in_one_of_many_files_is_found(good, refused):
 def test_a_missing_column_in_one_of_many_files_is_found(good, refused):
     file = good / "test" / "003.csv"
     file.write_text(file.read_text().replace("phi", "theta", 1))
-    assert f"{file}: row 1 names no column 'phi'" in refused(good)
+    assert f"{file}: row 1 has no column 'phi'" in refused(good)
 
 
 def test_time_is_checked_against_the_declared_sampling_time(good, refused):

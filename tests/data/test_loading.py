@@ -106,9 +106,9 @@ def test_anything_else_is_refused(refused, source):
 
 
 def test_columns_that_are_not_named_are_asked_for(frame, refused):
-    assert "name the columns that are inputs" in refused(frame)
-    assert "the columns are 't', 'u', 'y'" in refused(frame, ["u"])
-    assert "as a list" in refused(frame, "u", ["y"])
+    assert "say which columns are the inputs (--input NAME" in refused(frame)
+    assert "there are 't', 'u', 'y'" in refused(frame, ["u"])
+    assert "inputs=[..] in Python" in refused(frame, "u", ["y"])
 
 
 def test_a_column_cannot_be_input_and_output(frame, refused):
