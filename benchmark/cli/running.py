@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from simgap.runner import Listener, Progress
 
 FAILED = ("error", "timeout")
+FEW = 2
 
 
 def run(
@@ -38,8 +39,8 @@ def run(
     from rich.console import Console
 
     from simgap import runner, store
+    from simgap.reports.leaderboard import tables_of
     from simgap.reports.rendering import to_rich
-    from simgap.reports.tables import overview
 
     console = Console()
     try:
@@ -53,7 +54,10 @@ def run(
         raise typer.Exit(130) from None
     if json is not None:
         write_json(json, store.encoded(results))
-    console.print(to_rich(overview(results), console.width))
+    summary, *details = tables_of(results)
+    # The figures of a few data sets in their units; of many, a summary.
+    for table in details if len(details) <= FEW else [summary]:
+        console.print(to_rich(table, console.width))
     where = f"The results are in {out}; `simgap report {out}` makes the leaderboard."
     console.print(where, markup=False, highlight=False)
     if any(result.status in FAILED for result in results):
