@@ -33,7 +33,8 @@ dev: $(INSTALLED)
 # setuptools comes first and builds what has no wheel, so that nothing but locked versions is ever used.
 $(INSTALLED): requirements.lock pyproject.toml
 	@case "$(VERSION)" in 3.11|3.12|3.13) ;; *) \
-	  echo "simgap needs Python 3.11, 3.12 or 3.13, and '$(PYTHON)' is $(if $(VERSION),$(VERSION),not there); name another: make $(or $(MAKECMDGOALS),dev) PYTHON=python3.12" >&2; exit 1;; esac
+	  echo "simgap needs Python 3.11, 3.12 or 3.13, and '$(PYTHON)' is $(or $(VERSION),not there);" \
+	    "name another: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1;; esac
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	  echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu install python3-venv" >&2; exit 1; }
 	@echo "Setting up $(VENV) with Python $(VERSION), about a minute ..."
@@ -79,7 +80,7 @@ lint: $(INSTALLED)
 
 # The oldest Python decides, because packages drop it first. The comments on top of the files stay.
 lock:
-	@[ "$(VERSION)" = 3.11 ] || { echo "the lock files are made with Python 3.11: make lock PYTHON=python3.11" >&2; exit 1; }
+	@[ "$(VERSION)" = 3.11 ] || { echo "the lock files need Python 3.11: make lock PYTHON=python3.11" >&2; exit 1; }
 	@rm -rf build && mkdir build && $(PYTHON) -m venv build/lock
 	@build/lock/bin/python -m pip install --quiet --upgrade pip
 	@build/lock/bin/python -m pip install --quiet "$(PINNED)" --group dev .

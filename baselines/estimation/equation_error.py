@@ -17,7 +17,7 @@ from simgap.records import UnusableInput
 def estimate_arx(gram: Gram, orders: Orders, constant: bool = True) -> LinearFit:
     """One least-squares problem per output, all from one Gram matrix (Ljung 1999, eq. 4.12 and 7.34).
 
-    Raises UnusableInput when the experiments are too short for the order.
+    Raises TooFewSamples when the experiments are too short for the order.
     """
     ny, nu = orders.nb.shape
     constants, rows = np.zeros(ny), []
@@ -60,10 +60,14 @@ def assemble(
     return LinearFit(polynomial, orders, rows, constants, gram.rows)
 
 
+class TooFewSamples(UnusableInput):
+    """The experiments are too short for the model's order."""
+
+
 def check_length(rows: int, parameters: int, lags: int) -> None:
-    """Raises UnusableInput when fewer equations than coefficients are left after the first `lags` samples."""
+    """Raises TooFewSamples when fewer equations than coefficients are left after the first `lags` samples."""
     if rows <= parameters:
-        raise UnusableInput(
+        raise TooFewSamples(
             f"too few samples for the model's order: {parameters} coefficients from {rows} equations "
             f"(each experiment gives its length less {lags}); lower the order or record more"
         )

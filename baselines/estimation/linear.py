@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
+from simgap.baselines.estimation.equation_error import TooFewSamples
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
@@ -124,7 +125,7 @@ class LinearModel(ABC):
         for orders in short_enough:
             try:
                 fits.append(estimate(orders, None))
-            except UnusableInput:  # too few samples for this one
+            except TooFewSamples:
                 continue
         if not fits:
             raise UnusableInput(

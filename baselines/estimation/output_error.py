@@ -33,7 +33,7 @@ def estimate_oe(
     counts: the error that is minimised is the free run that will be scored. Without it the start states are free
     parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
     The search begins at `start`, a fit around the same operating point, or else at the two best of several linear
-    estimates. Raises UnusableInput when the experiments are too short for the order.
+    estimates. Raises TooFewSamples when the experiments are too short for the order.
     """
     ny = len(orders.nb)
     rows, transfers, constants, samples = [], [], np.zeros(ny), 0

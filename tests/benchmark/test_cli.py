@@ -68,7 +68,7 @@ def test_run_shows_each_job_and_the_figures_and_writes_json(capsys, tmp_path, su
     code, out, err = run(capsys, "run", suite("Mean", "IsNaN"), "--out", tmp_path / "out", "--json", tmp_path / "j")
     assert (code, err) == (0, "")
     assert "[1/2] Mean on noise, seed 0: fitted in" in out
-    assert "RMSE phi" in out
+    assert "[deg]" in out  # the column of phi, wrapped to the width of the terminal
     rows = json.loads((tmp_path / "j").read_text())
     assert len(rows) == 8
     assert rows[-1]["metrics"]["phi"]["rmse"] == "inf"
@@ -84,7 +84,7 @@ def test_report_shows_the_tables_and_writes_the_files(capsys, tmp_path, suite):
     run(capsys, "run", suite("Mean"), "--out", tmp_path / "out")
     code, out, err = run(capsys, "report", tmp_path / "out")
     assert (code, err) == (0, "")
-    assert "RMSE phi" in out
+    assert "Free-run fit in percent" in out
     assert (tmp_path / "out" / "leaderboard.md").exists()
     assert (tmp_path / "out" / "results.csv").exists()
 
