@@ -66,8 +66,7 @@ benchmark: $(INSTALLED)
 
 # Without the conftest.py above it, whose checks of shapes would be timed along.
 speed: peers
-	@$(BIN)/python -m pytest -q tests/speed --confcutdir=tests/speed \
-	  -o 'python_files=bench_*.py' -o 'python_functions=bench_*'
+	@$(BIN)/python -m pytest -q --confcutdir=tests/speed tests/speed/bench_*.py
 
 # pyright finds the mapped name only in an installed copy; sed turns its paths back into ours.
 lint: $(INSTALLED)

@@ -148,10 +148,20 @@ class PredictionError:
         """Project signals [..., nc + T] off what e before the record adds: itself, and its echo through 1/C."""
         if self.nc == 0:
             return signals
-        c, length = self.noise(theta), signals.shape[-1]
-        impulse = np.eye(1, length - self.nc)[0]
-        start = np.eye(self.nc, length)
+        c = self.noise(theta)
+        heard = signals[..., : self.nc + _ringing(c, signals.shape[-1] - self.nc)]
+        impulse = np.eye(1, heard.shape[-1] - self.nc)[0]
+        start = np.eye(self.nc, heard.shape[-1])
         for k in range(self.nc):  # row k is a unit e, nc - k samples before the record
             start[k, self.nc :] = divide(multiply(-c[self.nc - k :], impulse), c)
-        basis = np.linalg.qr(start.T)[0]  # [nc + T, nc]
-        return signals - (signals @ basis) @ basis.T
+        basis = np.linalg.qr(start.T)[0]  # [n, nc]
+        heard -= (heard @ basis) @ basis.T
+        return signals
+
+
+def _ringing(c: np.ndarray, length: int) -> int:
+    """After how many samples the echo of 1/C is lost in rounding: r^n < 1e-17 for its largest root r, and some more."""
+    radius = np.abs(np.roots(c)).max(initial=0.0)
+    if radius > 0.999:
+        return length
+    return min(length, 60 + int(40 / -np.log(max(radius, 1e-9))))
