@@ -134,10 +134,9 @@ class PredictionError:
 
     def pseudo_linear(self, errors: list[np.ndarray]) -> np.ndarray:
         """theta by least squares on Phi and on past errors that are taken as known."""
-        p = self.linear + self.nc
-        columns = [np.concatenate((phi, self.past(e))).reshape(p, -1) for phi, e in zip(self.phi, errors, strict=True)]
-        target = np.concatenate([y.ravel() for y in self.y])
-        return self.allowed(np.linalg.lstsq(np.concatenate(columns, axis=1).T, target, rcond=None)[0])[0]
+        columns = (np.concatenate((phi, self.past(e))) for phi, e in zip(self.phi, errors, strict=True))
+        products = sum_up(zip(self.y, columns, strict=True))
+        return self.allowed(np.linalg.lstsq(products.hessian, products.gradient, rcond=1e-14)[0])[0]
 
     def _filtered(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """signals / C with nothing in the nc samples before them."""
