@@ -46,7 +46,7 @@ class Polynomial:
         n = y_init.shape[1]
         u = u - self.u_mean
         state = self._state_after(u[:, :n], y_init - self.y_mean)
-        return filter_matrix(self.a[1:], self.b, u[:, n:], state) + self.y_mean
+        return _run(self.a, self.b, u[:, n:], state) + self.y_mean
 
     def predict(self, u: Float[np.ndarray, "B T nu"], y: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T ny"]:
         """One-step predictions y_hat(t | t-1) from measured outputs; the start state fits the whole record."""
@@ -82,7 +82,7 @@ class Polynomial:
         return np.concatenate((self.b, self.c - self.a), axis=2)
 
     def _follow(self, u: np.ndarray, y: np.ndarray, start: np.ndarray) -> np.ndarray:
-        return filter_matrix(self.c[1:], self._predictor, np.concatenate((u, y), axis=2), start)
+        return _run(self.c, self._predictor, np.concatenate((u, y), axis=2), start)
 
     def _start_state(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
         """z [B, N, ny] at t = 0 by least squares on the one-step prediction errors of the record.
@@ -103,7 +103,7 @@ class Polynomial:
         ny, size = len(self.y_mean), self.order * len(self.y_mean)
         unit = np.eye(size).reshape(size, self.order, ny)
         return (
-            filter_matrix(self.c[1:], self._predictor[:1], np.zeros((size, n, self._predictor.shape[2])), unit)
+            _run(self.c, self._predictor[:1], np.zeros((size, n, self._predictor.shape[2])), unit)
             .reshape(size, n * ny)
             .T
         )
@@ -119,3 +119,9 @@ class Polynomial:
             for m in range(k + 1, min(self.order, n + k) + 1):
                 state[:, k] += inputs[:, n + k - m] @ self._predictor[m].T - y_hat[:, n + k - m] @ self.c[m].T
         return state
+
+
+def _run(a: np.ndarray, b: np.ndarray, u: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """A(q) y = B(q) u from the state z, for arrays in any memory order."""
+    a, b, z = (np.ascontiguousarray(part) for part in (a[1:], b, z))
+    return filter_matrix(a, b, u, z)

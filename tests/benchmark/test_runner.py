@@ -186,7 +186,7 @@ COMMAND = [sys.executable, "-c", "import sys; from simgap.cli import main; sys.e
 
 def wait_for(path):
     deadline = time.monotonic() + 30
-    while not path.exists():
+    while not path.exists() or not path.stat().st_size:
         assert time.monotonic() < deadline, f"{path} did not appear"
         time.sleep(0.05)
 

@@ -17,7 +17,7 @@ BEAM = np.random.default_rng(0).normal(size=(1000, 2))
 def packed(table: np.ndarray) -> bytes:
     text = io.StringIO()
     np.savetxt(text, table)
-    return gzip.compress(text.getvalue().encode())
+    return gzip.compress(text.getvalue().encode(), mtime=0)
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_daisy_set_is_fetched_once_and_then_loads(site, no_files):
         urllib.error.URLError("no\nroute"),
         TimeoutError(),
         b"<html>moved</html>",
-        gzip.compress(b"<html>moved</html>"),
+        gzip.compress(b"<html>moved</html>", mtime=0),
         packed(BEAM)[:500],
         packed(BEAM[:, :1]),
         packed(BEAM * np.nan),
