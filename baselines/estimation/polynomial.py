@@ -46,7 +46,9 @@ class Polynomial:
         n = y_init.shape[1]
         u = u - self.u_mean
         state = self._state_after(u[:, :n], y_init - self.y_mean)
-        return _run(self.a, self.b, u[:, n:], state) + self.y_mean
+        y = _run(self.a, self.b, u[:, n:], state)
+        y += self.y_mean
+        return y
 
     def predict(self, u: Float[np.ndarray, "B T nu"], y: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T ny"]:
         """One-step predictions y_hat(t | t-1) from measured outputs; the start state fits the whole record."""
@@ -102,11 +104,8 @@ class Polynomial:
         """[n*ny, N*ny]: what each element of z adds to the next n predictions."""
         ny, size = len(self.y_mean), self.order * len(self.y_mean)
         unit = np.eye(size).reshape(size, self.order, ny)
-        return (
-            _run(self.c, self._predictor[:1], np.zeros((size, n, self._predictor.shape[2])), unit)
-            .reshape(size, n * ny)
-            .T
-        )
+        nothing = np.zeros((size, n, self._predictor.shape[2]))
+        return _run(self.c, self._predictor[:1], nothing, unit).reshape(size, n * ny).T
 
     def _state_after(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
         """z [B, N, ny] at t = n, after the predictor has followed the n measured samples."""
@@ -123,5 +122,4 @@ class Polynomial:
 
 def _run(a: np.ndarray, b: np.ndarray, u: np.ndarray, z: np.ndarray) -> np.ndarray:
     """A(q) y = B(q) u from the state z, for arrays in any memory order."""
-    a, b, z = (np.ascontiguousarray(part) for part in (a[1:], b, z))
-    return filter_matrix(a, b, u, z)
+    return filter_matrix(*(np.ascontiguousarray(part) for part in (a[1:], b, u, z)))
