@@ -23,7 +23,7 @@ def provenance(threads: int) -> dict[str, Any]:
         "scipy": version("scipy"),
         "device": "cpu",
         "threads": threads,
-        "platform": platform.platform(),
+        "platform": f"{platform.system()} {platform.machine()}",
     }
 
 
