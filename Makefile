@@ -60,7 +60,7 @@ test-slow: peers
 # After an interruption, or with one more model, only what is not in results/ yet is run. A failed job (1) is a row of
 # the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.
 benchmark: $(INSTALLED)
-	@[ ! -d results ] || echo "Carrying on in results/; delete it to run every job anew."
+	@[ ! -d results ] || echo "Carrying on in results/: jobs whose data and model are unchanged are not run again."
 	@[ -t 1 ] || export COLUMNS=200; failed=0; $(BIN)/simgap run full --jobs $(JOBS) --out results || failed=$$?; \
 	  [ $$failed -gt 1 ] || $(BIN)/simgap report results; exit $$failed
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from simgap import store
-from simgap.fitting import check_params
+from simgap.fitting import check_params, model_class
 from simgap.jobs import Card, Job, Source
-from simgap.provenance import file_sha256
+from simgap.provenance import source_sha256
 from simgap.records import Result, UnusableInput
 from simgap.registry import DATASETS
 from simgap.store import plain
@@ -78,9 +78,13 @@ def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple
 def plan(
     suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[Source, Card]], provenance: dict[str, Any]
 ) -> list[Job]:
-    """All jobs, one data set after the other, because a worker keeps the last one it loaded."""
+    """All jobs, one data set after the other, because a worker keeps the last one it loaded.
+
+    Each carries a digest of its model's code: results of the old code must not stand for the new.
+    """
+    digests = {entry.name: {"model_sha256": source_sha256(model_class(entry.name))} for entry in entries}
     return [
-        Job(entry, source, card, seed, suite.tasks, provenance | _model_digest(entry))
+        Job(entry, source, card, seed, suite.tasks, provenance | digests[entry.name])
         for source, card in data
         for seed in range(suite.seeds)
         for entry in entries
@@ -97,7 +101,7 @@ def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.K
 
 
 def done_already(job: Job, rows: dict[store.Key, Result]) -> list[Result]:
-    """The job's results if all of them are stored and came from the same data and model file, else none."""
+    """The job's results if all of them are stored and came from the same data and code of the model, else none."""
     found = [rows.get(store.key(owed)) for owed in job.owed()]
     wanted = {name: job.about.provenance.get(name) for name in ("data_sha256", "model_sha256")}
     for row in found:
@@ -113,10 +117,3 @@ def with_seeds(suite: Suite, seeds: int | None) -> Suite:
     if seeds < 1:
         raise UnusableInput(f"--seeds {seeds}: give at least one seed")
     return replace(suite, seeds=seeds)
-
-
-def _model_digest(entry: Entry) -> dict[str, str]:
-    """A user edits a model file and runs again: the old results must not stand for the new file."""
-    if ".py:" not in entry.name:
-        return {}
-    return {"model_sha256": file_sha256(Path(entry.name.rpartition(":")[0]))}

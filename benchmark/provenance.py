@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import platform
 import subprocess
 from functools import cache
@@ -27,9 +28,14 @@ def provenance(threads: int) -> dict[str, Any]:
     }
 
 
-def file_sha256(path: Path) -> str:
-    """Digest of a file's content."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def source_sha256(model: type) -> str:
+    """Digest of the code that makes a model: its file and, for one of simgap's own, the machinery one level down."""
+    file = Path(inspect.getfile(model))
+    machinery = sorted(file.parent.glob("*/*.py")) if model.__module__.startswith("simgap.") else []
+    digest = hashlib.sha256()
+    for path in (file, *machinery):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 @cache

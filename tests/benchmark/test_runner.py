@@ -95,6 +95,17 @@ def test_changed_data_are_run_again(suite, tmp_path, dataset):
     assert len(rows) == 4
 
 
+def test_results_of_older_code_of_a_registered_model_are_run_again(tmp_path, folder):
+    chosen = {"models": ["mean", "hold"], "datasets": [str(folder)], "out": tmp_path / "out"}
+    simgap.run("smoke", **chosen)
+    path = tmp_path / "out" / "smoke" / "mean.jsonl"
+    digest = store.read(path)[0].provenance["model_sha256"]
+    path.write_text(path.read_text().replace(digest, "0" * 64))
+    events = []
+    simgap.run("smoke", **chosen, progress=events.append)
+    assert {row.model for event in events for row in event.finished} == {"mean"}
+
+
 def test_a_changed_model_file_is_run_again(suite, tmp_path, folder):
     file = tmp_path / "mine.py"
     for value in (1.0, 2.0):
