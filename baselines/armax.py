@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
@@ -45,9 +44,4 @@ class Armax(LinearModel):
 
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:
         shift = rough_means(experiments, self.offset)
-
-        def estimate(orders: Orders, start: LinearFit | None) -> LinearFit:
-            around = start.operating_point if start else shift
-            return estimate_armax(experiments, around, orders, self.offset, start)
-
-        return estimate
+        return lambda orders, start: estimate_armax(experiments, shift, orders, self.offset, start)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
@@ -47,9 +46,4 @@ class Oe(LinearModel):
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:
         shift = rough_means(experiments, self.offset)
         n_start = n_init if self.start == "n_init" else None
-
-        def estimate(orders: Orders, start: LinearFit | None) -> LinearFit:
-            around = start.operating_point if start else shift
-            return estimate_oe(experiments, around, orders, self.offset, n_start, start)
-
-        return estimate
+        return lambda orders, start: estimate_oe(experiments, shift, orders, self.offset, n_start, start)

@@ -32,9 +32,10 @@ def estimate_oe(
     With n_start, each simulation starts from the state that the first n_start samples show, and only what follows
     counts: the error that is minimised is the free run that will be scored. Without it the start states are free
     parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
-    The search begins at `start`, a fit around the same operating point, or else at the two best of several linear
-    estimates. Raises TooFewSamples when the experiments are too short for the order.
+    The search begins at `start`, an earlier fit, and around its operating point, or else at the two best of several
+    linear estimates. Raises TooFewSamples when the experiments are too short for the order.
     """
+    shift = start.operating_point if start else shift
     ny = len(orders.nb)
     rows, transfers, constants, samples = [], [], np.zeros(ny), 0
     for i in range(ny):
@@ -100,6 +101,7 @@ class OutputError:
 
     @property
     def n_params(self) -> int:
+        """How many numbers theta holds."""
         return sum(self.nf[j] + self.nb[j] for j in self.used) + self.constant
 
     @property

@@ -28,10 +28,10 @@ def estimate_armax(
 ) -> LinearFit:
     """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, C kept stable.
 
-    The search begins at `start`, a fit around the same operating point, or else at two linear estimates.
+    The search begins at `start`, an earlier fit, and around its operating point, or else at two linear estimates.
     Ljung 1999, sections 7.2 and 10.2. Raises TooFewSamples when the experiments are too short for the order.
     """
-    gram = lagged_gram(experiments, shift, orders.max_lag)
+    gram = lagged_gram(experiments, start.operating_point if start else shift, orders.max_lag)
     ny = len(orders.na)
     rows, constants, noise = [], np.zeros(ny), []
     for i in range(ny):

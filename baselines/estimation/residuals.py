@@ -18,6 +18,8 @@ from simgap.records import Experiment
 
 # Correlations settle long before; more samples would only cost memory.
 ENOUGH_SAMPLES = 50_000
+# A record shorter than so many times the largest lag says little of it.
+RECORD_TO_LAG = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +57,20 @@ def residual_analysis(
         r(tau) = z' e / (|z| |e|),   var z' e = z' M R_e M z,   M = 1 - psi (psi' psi)^-1 psi',
 
     for z(t) = u(t - tau) or e(t - tau) and psi the slopes of the errors (Ljung 1999, section 16.6). The plain 1/N is
-    too wide at small lags, and wrong where residual and input are both coloured.
+    too wide at small lags, and wrong where residual and input are both coloured. Short records are asked for fewer
+    lags; where even one lag is too many, an output has no findings.
     """
+    longest = max(map(len, experiments)) - fit.orders.max_lag
+    max_lag = max(1, min(max_lag, longest // RECORD_TO_LAG))
     return [_of_output(fit, experiments, i, inputs, max_lag) for i in range(len(fit.rows))]
 
 
 def _of_output(
     fit: LinearFit, experiments: Sequence[Experiment], output: int, inputs: Sequence[str], max_lag: int
 ) -> list[Correlation]:
-    pieces = list(_aligned(fit, experiments, output, max_lag))
+    pieces = [piece for piece in _aligned(fit, experiments, output) if len(piece[0]) >= RECORD_TO_LAG * max_lag]
+    if not pieces:
+        return []
     own = range(1, max_lag + 1)
     both = range(-max_lag, max_lag + 1)
     found = [_correlate("its own past", pieces, own, lambda e, u: e, white=True)]
@@ -72,8 +79,8 @@ def _of_output(
     return found
 
 
-def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int, max_lag: int) -> Iterator[tuple]:
-    """e [T], slopes [p, T] and u [T, nu] of each experiment, over the same samples."""
+def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int) -> Iterator[tuple]:
+    """e [T], slopes [p, T] and u [T, nu] of each experiment, over the same samples, until there are enough."""
     model, before = fit.polynomial, int(fit.orders.nc[output])
     shift = np.concatenate((model.y_mean, model.u_mean))
     if fit.orders.nf.any():
@@ -84,11 +91,11 @@ def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int, max
     seen = 0
     for (e, slope), u in zip(equation.linearised(theta), equation.u, strict=True):
         for s in range(len(e)):
-            length = e.shape[1] - before
-            if length > 4 * max_lag and seen < ENOUGH_SAMPLES:
-                kept = slice(before, before + ENOUGH_SAMPLES - seen)
-                seen += length
-                yield e[s, kept], slope[:, s, kept], u[s, u.shape[1] - length :][:ENOUGH_SAMPLES]
+            if seen >= ENOUGH_SAMPLES:
+                return
+            kept = slice(before, before + ENOUGH_SAMPLES)
+            seen += e.shape[1] - before
+            yield e[s, kept], slope[:, s, kept], u[s, :ENOUGH_SAMPLES]
 
 
 def _correlate(name: str, pieces: list, lags: range, signal_of, white: bool) -> Correlation:

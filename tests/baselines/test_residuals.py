@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from simgap.baselines.arx import Arx
+from simgap.baselines.estimation import residuals
 from simgap.baselines.estimation.residuals import residual_analysis
 from simgap.baselines.oe import Oe
 from simgap.records import Experiment, TrainingSet
@@ -72,3 +73,25 @@ def test_feedback_shows_at_negative_lags():
     ((_, with_input),) = residual_analysis(model.result, data, ["voltage"])
     assert (with_input.outside < 0).sum() >= 1
     assert 0 in with_input.outside  # u(t) answers to e(t) at once
+
+
+@pytest.mark.parametrize("length", [8, 12, 40, 100])
+def test_a_short_record_is_asked_for_fewer_lags(length):
+    rng = np.random.default_rng(4)
+    data = (experiment(rng, length),)
+    model = Arx(1, 1)
+    model.fit(TrainingSet(data, (), 2), 0)
+    (found,) = residual_analysis(model.result, data, ["voltage"])
+    assert all(np.isfinite(c.values).all() and c.lags.max() <= max(1, length // 5) for c in found)
+    assert "residual standard deviation" in model.summary()
+
+
+def test_more_experiments_than_are_needed_are_left_out(monkeypatch):
+    monkeypatch.setattr(residuals, "ENOUGH_SAMPLES", 510)  # the third experiment of 199 is more than enough
+    rng = np.random.default_rng(5)
+    data = tuple(experiment(rng, 200) for _ in range(6))
+    model = Arx(1, 1)
+    model.fit(TrainingSet(data, (), 5), 0)
+    ((past, _),) = residual_analysis(model.result, data, ["voltage"])
+    ((same, _),) = residual_analysis(model.result, data[:3], ["voltage"])
+    np.testing.assert_array_equal(past.values, same.values)
