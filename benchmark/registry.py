@@ -120,6 +120,7 @@ def _registered_names(path: Path, constant: str) -> list[str]:
 
 
 MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")
+EFFECTS = Registry("effect", ("simgap.effects",), "EFFECTS")
 DATASETS = Registry("dataset", ("simgap.data",), "DATASETS")
 
 

@@ -1,0 +1,152 @@
+"""The inner loops of the grey-box simulation, compiled."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numba import NumbaExperimentalFeatureWarning, njit, types
+
+# Function pointers as arguments are called experimental since 2020; what is used of them is tested.
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
+# Every force term: (x, v, t, h, p, i, m, j) -> number, see simgap.effects.effect.ForceEffect.
+TERM = types.float64(
+    types.float64, types.float64, types.float64, types.float64,
+    types.float64[::1], types.int64, types.float64[::1], types.int64,
+)  # fmt: skip
+SLOTS = 5  # force terms that one model may have; the tuple has this length, so that the loop is compiled once
+FORCE, FRICTION, OUTFLOW, RIM = range(4)
+
+_matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
+
+
+@njit(types.void(_matrix, _matrix, _matrix), cache=True, nogil=True)
+def _multiply(a, b, product):
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            product[i, j] = 0.0
+            for q in range(a.shape[1]):
+                product[i, j] += a[i, q] * b[q, j]
+
+
+@njit(types.void(_matrix, types.float64, _matrix, _matrix, _matrix), cache=True, nogil=True)
+def transition(a, h, e, g0, g1):
+    """Fill exp(A h), integral of exp(A s), and integral of exp(A (h - s)) s / h, over s from 0 to h.
+
+    Taylor series with scaling and doubling: for phi_1(A h) h and phi_2(A h) h (Hochbruck and Ostermann 2010, 2.10).
+    """
+    n = a.shape[0]
+    size = 0.0
+    for i in range(n):
+        for j in range(n):
+            size += abs(a[i, j])
+    halvings = 0
+    while size * h > 0.5:
+        h *= 0.5
+        halvings += 1
+    power, product = np.zeros((n, n)), np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            power[i, j] = e[i, j] = 1.0 if i == j else 0.0
+            g0[i, j], g1[i, j] = h * power[i, j], 0.5 * h * power[i, j]
+    factor = 1.0
+    for k in range(1, 13):
+        _multiply(power, a, product)
+        factor *= k
+        for i in range(n):
+            for j in range(n):
+                power[i, j] = h * product[i, j]
+                e[i, j] += power[i, j] / factor
+                g0[i, j] += h * power[i, j] / (factor * (k + 1))
+                g1[i, j] += h * power[i, j] / (factor * (k + 1) * (k + 2))
+    for _ in range(halvings):
+        # Over two steps: e e; the constant enters twice; the ramp is half a ramp, then half a ramp on a half.
+        _multiply(e, g1, product)
+        for i in range(n):
+            for j in range(n):
+                g1[i, j] = 0.5 * (product[i, j] + g1[i, j] + g0[i, j])
+        _multiply(e, g0, product)
+        for i in range(n):
+            for j in range(n):
+                g0[i, j] += product[i, j]
+        _multiply(e, e, product)
+        for i in range(n):
+            for j in range(n):
+                e[i, j] = product[i, j]
+
+
+@njit(
+    types.void(
+        _matrix, _matrix, _matrix, types.float64[::1], types.int64, types.int64, _matrix, _matrix,
+        types.int64, types.float64, types.UniTuple(types.FunctionType(TERM), SLOTS), types.int64, _places,
+        types.float64[::1], _places, _places, types.float64[::1], _cube,
+    ),
+    cache=True, nogil=True,
+)  # fmt: skip
+def run_plant(
+    e, g0, g1, rates, entry, fast, drive, start, substeps, h, terms, n_terms, roles, p, p_at, m_at, memory, states
+):
+    """Fill states [E, T, n] from start [E, n] and the drive [E, T * substeps], constant over each substep.
+
+    Linear parts are exact; forces are extrapolated linearly over a substep (exponential Adams-Bashforth of order 2);
+    dry friction is the impulse within its bound that brings the velocity nearest to zero (Moreau 1988), so that it
+    sticks without events.
+    """
+    experiments, samples, n = states.shape
+    z, new = np.empty(n), np.empty(n)
+    force, before = np.empty(n), np.empty(n)
+    for experiment in range(experiments):
+        for i in range(n):
+            z[i] = start[experiment, i]
+        memory[:] = 0.0
+        first = True
+        step = 0
+        for k in range(samples):
+            for i in range(n):
+                states[experiment, k, i] = z[i]
+            if k == samples - 1:
+                break
+            for _ in range(substeps):
+                t = step * h
+                force[:] = 0.0
+                hold = 0.0
+                for q in range(n_terms):
+                    if roles[q] == FORCE:
+                        force[entry] += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
+                    elif roles[q] == FRICTION:
+                        hold += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
+                    elif roles[q] == OUTFLOW:
+                        for i in range(n):
+                            flow = rates[i] * terms[q](z[i], 0.0, t, h, p, p_at[q], memory, m_at[q])
+                            force[i] -= flow
+                            if i + 1 < n:
+                                force[i + 1] += flow
+                if first:
+                    before[:] = force
+                    first = False
+                for i in range(n):
+                    total = g0[i, entry] * drive[experiment, step]
+                    for j in range(n):
+                        total += e[i, j] * z[j]
+                    if n_terms > 0:
+                        for j in range(n):
+                            total += g0[i, j] * force[j] + g1[i, j] * (force[j] - before[j])
+                    new[i] = total
+                if hold > 0.0:
+                    gain = g0[fast, entry]
+                    impulse = min(max(-new[fast] / gain, -hold), hold)
+                    for i in range(n):
+                        new[i] += g0[i, entry] * impulse
+                for q in range(n_terms):
+                    if roles[q] == RIM:
+                        at = p_at[q]
+                        for i in range(n):
+                            rim = p[at] if i == n - 1 else p[at + 1]
+                            if new[i] > rim:
+                                if i + 1 < n:
+                                    new[i + 1] += p[at + 2] * (new[i] - rim)
+                                new[i] = rim
+                z[:] = new
+                before[:] = force
+                step += 1

@@ -1,0 +1,65 @@
+"""How likely errors are, when the measurement noise may be coloured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Autoregressive noise on each output: D(q) e = white of variance s^2, D monic [ny, order + 1]."""
+
+    polynomials: Float[np.ndarray, "ny m"]
+    deviations: Float[np.ndarray, " ny"]
+
+    @property
+    def order(self) -> int:
+        """Past samples that the noise remembers."""
+        return self.polynomials.shape[1] - 1
+
+    def whiten(self, e: Float[np.ndarray, "... T ny"]) -> Float[np.ndarray, "... T ny"]:
+        """Errors, or slopes of errors, in units of the white noise; the first samples count for nothing."""
+        if not self.order:
+            return e / self.deviations
+        white = np.empty_like(e)
+        for j, polynomial in enumerate(self.polynomials):
+            white[..., j] = lfilter(polynomial / self.deviations[j], [1.0], e[..., j], axis=-1)
+        white[..., : self.order, :] = 0.0
+        return white
+
+
+def white(deviations: Float[np.ndarray, " ny"]) -> Noise:
+    """No memory."""
+    return Noise(np.ones((len(deviations), 1)), deviations)
+
+
+def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> Noise:
+    """The noise that errors e would be, by the Yule-Walker equations (Ljung 1999, section 4.2)."""
+    ny = e.shape[2]
+    polynomials, deviations = np.zeros((ny, order + 1)), np.ones(ny)
+    polynomials[:, 0] = 1.0
+    for j in range(ny):
+        x = np.where(mask, e[:, :, j], 0.0)
+        lags = np.array([np.sum(x[:, lag:] * x[:, : x.shape[1] - lag]) for lag in range(order + 1)])
+        floor = 1e-24 * mask.sum() + 1e-300
+        if order and lags[0] > floor:
+            polynomials[j, 1:] = -solve_toeplitz(lags[:-1] * (1 + 1e-9 * (np.arange(order) == 0)), lags[1:])
+        deviations[j] = np.sqrt(max(polynomials[j] @ lags, floor) / mask.sum())
+    return Noise(polynomials, deviations)
+
+
+def log_likelihood(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> float:
+    """Log-likelihood of errors e under the noise of that order that suits them best, up to a constant."""
+    noise = estimate(e, mask, order)
+    if not np.isfinite(noise.deviations).all():
+        return -np.inf
+    counted = mask.copy()
+    counted[:, :order] = False
+    w = noise.whiten(e)[counted] * noise.deviations  # [N, ny]
+    variance = np.mean(w * w, axis=0)
+    return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, 1e-300))))

@@ -1,0 +1,275 @@
+"""Which effects of the catalogue the data ask for: score test, refits, likelihood and held-out likelihood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.stats import chi2
+
+from simgap.baselines.grey.least_squares import Estimate, Problem, Records, Slopes, _Normal
+from simgap.baselines.grey.noise import Noise, estimate, log_likelihood, white
+from simgap.baselines.grey.plain import fit_plain
+from simgap.baselines.grey.scenes import scene_of
+from simgap.baselines.grey.structure import LOCAL_POWERS, Structure, Term
+from simgap.effects.effect import Start
+from simgap.records import Channels, Experiment, UnusableInput
+from simgap.registry import EFFECTS
+
+# The chance, over the whole catalogue, that noise alone passes for an effect.
+FALSE_NAMES = 1e-3
+# What held-out data must add to the log-likelihood: odds of 20 to 1.
+HELD_OUT = 3.0
+MAX_TERMS = 5
+MAX_NOISE_ORDER = 3
+STARTS = 2
+# Score tests below this log-likelihood ratio are not worth a refit.
+WORTH_A_REFIT = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One set of terms, fitted: log-likelihoods of training and held-out errors, and the numbers they cost."""
+
+    terms: tuple[Term, ...]
+    estimate: Estimate
+    train: float
+    valid: float
+    k: int  # numbers estimated for all experiments
+    k_train: int  # numbers estimated for single training experiments
+    k_valid: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the effects."""
+        return tuple(term.effect.name for term in self.terms)
+
+    @property
+    def score(self) -> float:
+        """Log-likelihood of all data less what its parameters cost (Schwarz 1978 for those of all experiments)."""
+        n = self.estimate.errors.shape[0] * self.estimate.errors.shape[1]
+        per_record = math.log(self.estimate.errors.shape[1])
+        return self.train + self.valid - 0.5 * self.k * math.log(n) - 0.5 * (self.k_train + self.k_valid) * per_record
+
+
+@dataclass
+class Search:
+    """The effects that explain one output (or a position with its velocity) of a training set.
+
+    `path` holds the models of increasing size, `rivals` what else was tried in each round.
+    """
+
+    train: Records
+    valid: Records
+    channels: Channels
+    outputs: tuple[int, ...]
+    structure: Structure
+    plain: Estimate
+    threads: int = 2
+    noise_order: int = 0
+    path: list[Trial] = field(default_factory=list)
+    rounds: list[list[Trial]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]):
+        """Fit the plain model of the outputs' kind."""
+        records = Records.of(train, outputs)
+        held_out = Records.of(valid, outputs) if valid else records
+        structure, plain = choose_plain(records, held_out, channels, outputs)
+        problem = Problem(structure, records, white(np.ones(structure.ny)))
+        structure = replace(structure, scene=scene_of(plain, problem, channels, 0, outputs[0]))
+        return cls(records, held_out, channels, tuple(outputs), structure, replace(plain, structure=structure))
+
+    # ------------------------------------------------------------------ one model
+
+    @cached_property
+    def base_noise(self) -> Noise:
+        """White noise as large as the errors of the plain model; weighs the outputs against each other."""
+        return white(np.sqrt(np.mean(self.plain.errors[self.train.mask] ** 2, axis=0)) + 1e-300)
+
+    def assess(self, found: Estimate) -> Trial:
+        """Score a fitted model on training and on held-out data."""
+        structure = found.structure
+        held_out = Problem(structure, self.valid, self.base_noise)
+        fixed = np.ones(structure.size, dtype=bool)
+        on_valid = held_out.fit(found.theta, fixed=fixed, max_steps=10)
+        return Trial(
+            structure.terms, found,
+            log_likelihood(found.errors, self.train.mask, self.noise_order),
+            log_likelihood(on_valid.errors, self.valid.mask, self.noise_order),
+            int(structure.free.sum()), len(self.train.u) * len(structure.local), len(self.valid.u) * len(structure.local),
+        )  # fmt: skip
+
+    def fit(self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], noise: Noise | None = None) -> Estimate:
+        """The best fit of a set of terms from several starts."""
+        structure = self.structure.having(terms)
+        problem = Problem(structure, self.train, noise or self.base_noise)
+        return min((problem.fit(*start) for start in starts), key=lambda fit: fit.squares)
+
+    # ------------------------------------------------------------------ one round
+
+    def candidates(self, terms: Sequence[Term]) -> list[Term]:
+        """Every effect that suits the machine and is not in the model, on every channel."""
+        taken = {term.key for term in terms}
+        names = {term.effect.name for term in terms}
+        found = []
+        for name in EFFECTS.names():
+            effect = EFFECTS[name]()
+            if name == "outliers" or not effect.suits(self.structure.scene):
+                continue
+            if name == "coulomb_friction" and "stribeck_friction" in names:
+                continue
+            channels = {"input": self.structure.nu, "force": 1, "output": self.structure.ny}[effect.port]
+            found += [term for term in (Term(effect, i) for i in range(channels)) if term.key not in taken]
+        return found
+
+    def extend(self, here: Estimate, term: Term, slopes: Slopes) -> Estimate | None:
+        """The model with one term more, fitted from the starts that the score test likes best; None if none does."""
+        terms = [t for t in here.structure.terms if not replaces(term, t)]
+        structure = self.structure.having([*terms, term])
+        if term in structure.local:
+            return self.fit(structure.terms, [self.carry(here, structure, term, None)])
+        scored = sorted(self.screen(here, structure, term, slopes), key=lambda pair: -pair[0])
+        if not scored:
+            return None
+        if scored[0][0] < WORTH_A_REFIT and term.effect.parameters(self.structure.scene):
+            return None
+        starts = [self.carry(here, structure, term, start) for _, start in scored[:STARTS]]
+        return self.fit(structure.terms, starts)
+
+    def carry(self, here: Estimate, structure: Structure, term: Term, start: Start | None) -> tuple[np.ndarray, np.ndarray]:
+        """Theta and local numbers of a smaller model, as the start of a larger one."""
+        theta = np.zeros(structure.size)
+        theta[: structure.n_plant] = here.theta[: structure.n_plant]
+        local = np.zeros((len(here.local), structure.n_local))
+        local[:, : structure.order] = here.local[:, : structure.order]
+        for other in structure.terms:
+            if other == term or other not in here.structure.terms:
+                continue
+            if other in structure.local:
+                at = structure.order + structure.local.index(other)
+                local[:, at] = here.local[:, structure.order + here.structure.local.index(other)]
+            else:
+                theta[structure.term_at(other)] = here.theta[here.structure.term_at(other)]
+        if start is not None:
+            theta[structure.term_at(term)] = start.values
+        return theta, local
+
+    def screen(self, here: Estimate, structure: Structure, term: Term, slopes: Slopes) -> list[tuple[float, Start]]:
+        """Score test of each start: the log-likelihood that the step in the simulation would gain, to first order.
+
+        d = simulation with the effect less simulation without, made orthogonal to the model's own slopes;
+        gain = -N/2 log(1 - (d' e)^2 / (d' d  e' e)). Where d grows in proportion to a parameter, the start moves there.
+        """
+        noise = self.base_noise
+        base = Problem(here.structure, self.train, noise)
+        extended = Problem(structure, self.train, noise)
+        e = noise.whiten(here.errors).reshape(len(here.local), -1)
+        ee = float(np.vdot(e, e))
+        simulated = base.simulator.run(here.theta, here.local)
+        n = self.train.samples * structure.ny
+        scored = []
+        for start in term.effect.starts(self.structure.scene):
+            theta, local = self.carry(here, structure, term, start)
+            d = extended.simulator.run(theta, local) - simulated
+            d = noise.whiten(d * self.train.weights).reshape(e.shape)
+            if not np.isfinite(d).all() or not d.any():
+                scored.append((0.0, start))
+                continue
+            _, projected = _Normal.of(slopes, d).step(here.structure.free, 1e-9)
+            dd = float(np.vdot(d, d))
+            rest = max(dd - projected, 1e-6 * dd)
+            along = float(np.vdot(d, e))
+            if along < 0 and start.amplitude is None:
+                scored.append((0.0, start))
+                continue
+            gain = -0.5 * n * math.log(max(1 - along * along / (rest * ee), 1e-12))
+            if start.amplitude is not None:
+                values = list(start.values)
+                parameter = term.effect.parameters(self.structure.scene)[start.amplitude]
+                moved = values[start.amplitude] * along / rest
+                values[start.amplitude] = float(np.clip(moved, parameter.low, parameter.high))
+                start = Start(tuple(values), start.amplitude)
+            scored.append((gain, start))
+        return scored
+
+    def round(self, here: Estimate, without: Sequence[tuple[str, int]] = ()) -> list[Trial]:
+        """Every candidate added to a model, refitted and assessed; the best first."""
+        problem = Problem(here.structure, self.train, self.base_noise)
+        slopes = problem.slopes(here.theta, here.local, here.structure.free)
+        terms = [term for term in self.candidates(here.structure.terms) if term.key not in without]
+
+        def attempt(term: Term) -> Estimate | None:
+            return self.extend(here, term, slopes)
+
+        if self.threads > 1:
+            with ThreadPoolExecutor(self.threads) as pool:
+                fits = list(pool.map(attempt, terms))
+        else:
+            fits = [attempt(term) for term in terms]
+        found = [fit for fit in fits if fit is not None]
+        return sorted((self.assess(fit) for fit in found), key=lambda trial: -trial.score)
+
+    # ------------------------------------------------------------------ the whole search
+
+    def run(self) -> Search:
+        """Forward steps while noise alone would not do as well, then exchange, then what is not needed out again."""
+        here = self.assess(self.plain)
+        self.path = [here]
+        while len(here.terms) < MAX_TERMS:
+            trials = self.round(here.estimate)
+            if trials:
+                self._choose_noise_order(min(trials, key=lambda trial: trial.estimate.squares).estimate)
+                here, trials = self._again(here), sorted(map(self._again, trials), key=lambda trial: -trial.score)
+                self.path = [self._again(trial) for trial in self.path]
+            self.rounds.append(trials)
+            better = [trial for trial in trials if self.significant(here, trial)]
+            if not better:
+                break
+            here = better[0]
+            self.path.append(here)
+        return self
+
+    def _again(self, trial: Trial) -> Trial:
+        return self.assess(trial.estimate)
+
+    def _choose_noise_order(self, best: Estimate) -> None:
+        """The memory of the errors of the best model, by Schwarz' criterion."""
+        n = self.train.samples
+        values = [
+            log_likelihood(best.errors, self.train.mask, order) - 0.5 * order * self.structure.ny * math.log(n)
+            for order in range(MAX_NOISE_ORDER + 1)
+        ]
+        self.noise_order = int(np.argmax(values))
+
+    def significant(self, smaller: Trial, larger: Trial) -> bool:
+        """Whether the larger model says more than noise would make it say, in training data and in held-out data."""
+        ratio = larger.train - smaller.train
+        extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
+        tried = len(self.candidates(smaller.terms)) * STARTS
+        chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
+        held_out = larger.valid - smaller.valid - 0.5 * (larger.k_valid - smaller.k_valid) * math.log(
+            self.valid.mask.shape[1]
+        )
+        return bool(chance < FALSE_NAMES and held_out > HELD_OUT)
+
+
+def replaces(new: Term, old: Term) -> bool:
+    """Stribeck friction contains Coulomb friction."""
+    return new.effect.name == "stribeck_friction" and old.effect.name == "coulomb_friction"
+
+
+def choose_plain(
+    train: Records, valid: Records, channels: Channels, outputs: Sequence[int]
+) -> tuple[Structure, Estimate]:
+    """The plain linear model: order 1 for a velocity, 2 for a position, else what held-out data ask for up to 4."""
+    kind = channels.outputs[outputs[0]].kind
+    nu, dt = train.u.shape[2], train.dt
+    if kind in ("position", "velocity"):
+        structure = Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=len(outputs) == 2)
+        return structure, fit_plain(structure, train)
+    raise UnusableInput("not yet")

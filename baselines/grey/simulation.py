@@ -1,0 +1,117 @@
+"""From parameters, start states and inputs to simulated outputs; no measured output enters here."""
+
+from __future__ import annotations
+
+import inspect
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numba import cfunc
+
+from simgap.baselines.grey.kernels import SLOTS, TERM, run_plant, transition
+from simgap.baselines.grey.structure import LOCAL_POWERS, Structure
+from simgap.effects.effect import InputEffect, OutputEffect
+
+ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3}
+
+
+@lru_cache(maxsize=None)
+def compiled(term: Any) -> Any:
+    """A force term for the inner loop."""
+    return cfunc(TERM, cache=True)(inspect.unwrap(term))
+
+
+def nothing(x, v, t, h, p, i, m, j):
+    """Fills the unused slots."""
+    return 0.0
+
+
+class Simulator:
+    """One structure on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller."""
+
+    def __init__(self, structure: Structure, u: Float[np.ndarray, "E T nu"]) -> None:
+        self.structure = structure
+        self.substeps = structure.substeps
+        self.h = structure.dt / self.substeps
+        self.t = structure.dt * np.arange(u.shape[1])  # [T]
+        self.shape = u.shape
+        held = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)  # [nu, E, T * substeps]
+        self._u = np.ascontiguousarray(held)
+        self._arrived: dict[bytes, np.ndarray] = {}
+        forces = structure.forces()
+        if len(forces) > SLOTS:
+            raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
+        unused = SLOTS - len(forces)
+        self._terms = tuple(compiled(term.effect.term) for term in forces) + (compiled(nothing),) * unused
+        self._n_terms = len(forces)
+        self._roles = np.array([ROLES[term.effect.role] for term in forces] + [0] * unused)
+        self._p_at = np.array([structure.term_at(term).start for term in forces] + [0] * unused)
+        memory = np.cumsum([0] + [term.effect.memory for term in forces])
+        self._m_at = np.array([*memory[:-1], *([0] * unused)])
+        self._memory = np.zeros(max(1, memory[-1]))
+
+    def states(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E n"]) -> Float[np.ndarray, "E T n"]:
+        """The states of the plant at the samples, the first being the start."""
+        structure, (experiments, samples, _) = self.structure, self.shape
+        n = structure.order
+        a = structure.matrix(theta)
+        e, g0, g1 = np.empty((3, n, n))
+        transition(a, self.h, e, g0, g1)
+        states = np.empty((experiments, samples, n))
+        entry, fast = (0, 0) if structure.cascade else (n - 1, min(1, n - 1))
+        run_plant(
+            e, g0, g1, -np.diag(a).copy(), entry, fast, self.drive(theta), np.ascontiguousarray(start),
+            self.substeps, self.h, self._terms, self._n_terms, self._roles, theta, self._p_at, self._m_at,
+            self._memory, states,
+        )  # fmt: skip
+        return states
+
+    def drive(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
+        """b u + d after the actuators' effects, for every substep."""
+        structure = self.structure
+        gains, offset = theta[structure.at[1]], theta[structure.at[2]]
+        total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
+        for channel, gain in enumerate(gains):
+            total += gain * self.arrived(theta, channel)
+        return total
+
+    def arrived(self, theta: Float[np.ndarray, " p"], channel: int) -> Float[np.ndarray, "E K"]:
+        """What arrives at the plant of one input; kept, because most parameters do not change it."""
+        terms = self.structure.on("input", channel)
+        if not terms:
+            return self._u[channel]
+        values = [theta[self.structure.term_at(term)] for term in terms]
+        key = np.concatenate([[channel], *values]).tobytes()
+        if key not in self._arrived:
+            u = self._u[channel]
+            for term, p in zip(terms, values, strict=True):
+                assert isinstance(term.effect, InputEffect)
+                u = term.effect.term(u, p, self.h)
+            if len(self._arrived) > 1 + len(values):
+                self._arrived.pop(next(iter(self._arrived)))
+            self._arrived[key] = u
+        return self._arrived[key]
+
+    def outputs(
+        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], states: Float[np.ndarray, "E T n"]
+    ) -> Float[np.ndarray, "E T ny"]:
+        """The readings of the sensors."""
+        structure = self.structure
+        y = states @ structure.reading(theta).T
+        for channel in range(structure.ny):
+            for term in structure.on("output", channel):
+                if term in structure.local:
+                    power = LOCAL_POWERS[term.effect.name]
+                    value = local[:, structure.order + structure.local.index(term)]
+                    y[:, :, channel] += value[:, None] * self.t**power
+                else:
+                    assert isinstance(term.effect, OutputEffect)
+                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[structure.term_at(term)], self.t)
+        return y
+
+    def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
+        """Simulated outputs; local holds the start state and the local parameters of each experiment."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.outputs(theta, local, self.states(theta, local[:, : self.structure.order]))

@@ -1,0 +1,1 @@
+"""What a simulation gets wrong, and what physical cause explains it."""

@@ -1,0 +1,191 @@
+"""How much of an error a grouping of its samples explains, and how often chance alone explains as much.
+
+A simulation error is autocorrelated (drift, coloured noise, slow dynamics), so the F test for independent samples sees
+an effect in almost everything. Each test here keeps the correlation of the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.fft import dct, irfft, next_fast_len, rfft
+from scipy.stats import beta, f
+
+DRAWS = 2000  # of the distribution of Q
+SHUFFLES = 200  # of blocks
+
+
+def by_bins(
+    error: Float[np.ndarray, " N"],
+    labels: Int[np.ndarray, " N"],
+    lengths: Sequence[int],
+    seed: int,
+    parents: Sequence[int] = (),
+) -> tuple[float, float]:
+    """Share of the mean square that the means of bins explain beyond chance, and how often chance gives as much.
+
+    Q = sum_b n_b (m_b - m)^2 with m_b the mean error [unit of the error] of bin b. Experiments of `lengths` samples
+    stand one after the other; samples labelled -1 are in no bin. `parents` names a coarser bin for every bin: then m
+    is the mean of the parent, and only what the finer bins add counts.
+
+    Chance: in each experiment the error is taken apart into cosines and each cosine gets a random sign. That keeps
+    its spectrum, as random circular shifts do, and loses its relation to the bins; but shifts offer a single record
+    of N samples and correlation time tau no more than N/tau different answers, and tear ramps where they wrap. Over
+    all signs the bin sums S have the covariance C = sum_k c_k^2 i_k i_k', with c_k the cosine coefficients of the
+    error and i_k those of the bins' indicators, and are close to normal. So Q = S'AS is a sum of chi-square variables
+    weighted by the eigenvalues of CA, its mean is trace(CA), and no signs have to be drawn.
+    The cosine transform decorrelates strongly correlated noise: Ahmed, Natarajan, Rao, IEEE Trans. Comput. C-23
+    (1974) 90. The lag-free relative with random phases: Theiler et al., Physica D 58 (1992) 77.
+    """
+    indicator = (labels[:, None] == np.arange(labels.max() + 1)).astype(float)  # [N, B]
+    count = indicator.sum(axis=0)  # [B]
+    form = np.diag(1 / count)  # A [B, B]
+    parent_of = np.array(parents or [0] * len(count))
+    for parent in np.unique(parent_of):
+        inside = (parent_of == parent).astype(float)
+        form -= np.outer(inside, inside) / (inside @ count)
+
+    centred = error - error.mean()
+    sums = indicator.T @ centred  # S [B]
+    weighted = cosines(indicator, lengths) * cosines(centred[:, None], lengths)  # [N, B]
+    covariance = weighted.T @ weighted
+    values, vectors = np.linalg.eigh(form)
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    weights = np.maximum(np.linalg.eigvalsh(root.T @ covariance @ root), 0)
+    explained = float(sums @ form @ sums)
+    drawn = np.random.default_rng(seed).standard_normal((DRAWS, len(weights))) ** 2 @ weights
+    chance = (1 + np.count_nonzero(drawn >= explained)) / (1 + DRAWS)
+    return beyond(explained, float(weights.sum()), float(error @ error)), float(chance)
+
+
+def by_trend(
+    error: Float[np.ndarray, " N"],
+    fitted: Float[np.ndarray, " N"],
+    added: int,
+    removed: int,
+    experiment: Int[np.ndarray, " N"],
+) -> tuple[float, float]:
+    """The same for what is slow itself: `fitted` holds means of whole experiments or stretches of time, or lines.
+
+    F = (Q / p) / (tau R / (N - tau q)), with Q = |fitted|^2, R what is left, p = `added` the degrees of freedom of
+    `fitted`, q = `removed` those plus what was taken out before, and tau the correlation time of what is left [samples].
+    Random signs of cosines would keep a slow trend slow and call every trend chance: here the trend is the question,
+    so chance is noise with the correlation that remains once the trend is gone.
+    """
+    left = error - fitted
+    # Offsets of experiments are a view of their own; left in, they would pass for correlation within each of them.
+    left = left - means(left, experiment)
+    tau, reach = correlation_time(left, np.bincount(experiment), removed)
+    total, rest = float(error @ error), float(left @ left)
+    free = len(error) / tau - removed
+    if added < 1 or free < 1 or rest <= 0:
+        return 0.0, 1.0
+    explained, expected = float(fitted @ fitted), rest / free  # expected: of one degree of freedom, by chance
+    # tau is an estimate from 2 reach + 1 autocovariances, about as sure as a variance of N / (2 reach + 1) samples.
+    chance = f.sf(explained / (added * expected), added, min(free, len(error) / (2 * reach + 1)))
+    return beyond(explained, min(added * expected, total), total), float(chance)
+
+
+def by_experiments(
+    error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"], kind: Int[np.ndarray, " E"], about: float
+) -> tuple[float, float]:
+    """The same for the means of kinds of experiments [E] about the value `about`.
+
+    The experiments are the independent samples of the F test, since each may have an offset of its own.
+    """
+    count = np.bincount(experiment)  # [E]
+    mean = np.bincount(experiment, error) / count  # [E]
+    of_kind = (np.bincount(kind, count * mean) / np.bincount(kind, count))[kind]  # [E]
+    explained, rest = float(count @ (of_kind - about) ** 2), float(count @ (mean - of_kind) ** 2)
+    added, free = max(1, int(kind.max())), len(kind) - int(kind.max()) - 1
+    if free < 1 or rest <= 0:
+        return 0.0, 1.0
+    expected, total = rest / free, float(error @ error)
+    return beyond(explained, min(added * expected, total), total), float(
+        f.sf(explained / added / expected, added, free)
+    )
+
+
+def by_size(size: Float[np.ndarray, " n"], group: Int[np.ndarray, " n"], seed: int) -> tuple[float, float]:
+    """Part of the squared error that groups hold above their part of the blocks, beyond chance, and its chance.
+
+    D = sum_g max(0, s_g / s - n_g / n), with s_g the sum of the mean squares `size` of the blocks in `group` g.
+    Chance deals the blocks anew to the groups.
+    """
+    deals = np.random.default_rng(seed).permuted(np.tile(size, (SHUFFLES, 1)), axis=1)
+    deals = np.vstack([size, deals])  # [1 + SHUFFLES, n], the first as it was
+    member = (group[:, None] == np.arange(group.max() + 1)).astype(float)  # [n, G]
+    excess = np.maximum(0, deals @ member / size.sum() - member.mean(axis=0)).sum(axis=1)
+    chance = np.mean(excess >= excess[0] * (1 - 1e-9))  # its own deal included
+    return beyond(float(excess[0]), float(excess[1:].mean()), 1.0), float(chance)
+
+
+def blocks(error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean squares of blocks of each experiment, longer than their correlation, and the experiment of each block."""
+    squared, lengths = error**2 / np.mean(error**2), np.bincount(experiment)
+    reach = correlation_time(squared - means(squared, experiment), lengths, len(lengths))[1]
+    whole = [part[: len(part) // (2 * reach) * 2 * reach] for part in np.split(squared, np.cumsum(lengths)[:-1])]
+    sizes = [part.reshape(-1, 2 * reach).mean(axis=1) for part in whole]
+    return np.concatenate(sizes), np.repeat(np.arange(len(sizes)), [len(part) for part in sizes])
+
+
+def by_bands(power: Float[np.ndarray, " F"], band: Int[np.ndarray, " F"]) -> tuple[int, float, float]:
+    """The band that holds most of the power above its width, the share above its width, and its chance in white noise.
+
+    For white noise the power of the n_b lines of band b, as a part of all n, is Beta(n_b, n - n_b); the p-value counts
+    the number of bands that were looked at (Bonferroni).
+    """
+    lines = np.bincount(band)
+    part = np.bincount(band, power) / power.sum()
+    share = np.maximum(0, (part - lines / len(band)) / np.maximum(1 - lines / len(band), 1e-9))
+    best = int(np.argmax(share))
+    free = len(band) - lines[best]
+    if free < 1:
+        return best, 0.0, 1.0
+    chance = min(1.0, np.count_nonzero(lines) * beta.sf(min(part[best], 1.0), lines[best], free))
+    return best, float(min(share[best], 1.0)), float(chance)
+
+
+def cosines(columns: Float[np.ndarray, "N m"], lengths: Sequence[int]) -> Float[np.ndarray, "N m"]:
+    """Orthonormal cosine transform of each column, experiment by experiment."""
+    parts = np.split(columns, np.cumsum(lengths)[:-1])
+    return np.concatenate([dct(part, axis=0, norm="ortho") for part in parts])
+
+
+def correlation_time(
+    left: Float[np.ndarray, " N"], lengths: Sequence[int] | np.ndarray, removed: float
+) -> tuple[float, int]:
+    """Samples that count as one: tau = 1 + 2 sum_k rho_k up to the first rho_k that is not positive, at least 1.
+
+    `removed` means were taken out of `left`. That lowers every autocovariance by about removed tau / N of the
+    variance, which is put back; without it slow noise looks faster than it is.
+    """
+    total, kept = np.zeros(max(lengths)), np.zeros(max(lengths))
+    for part in np.split(left, np.cumsum(lengths)[:-1]):
+        n = len(part)
+        spectrum = np.abs(rfft(part, next_fast_len(2 * n, real=True))) ** 2
+        total[:n] += irfft(spectrum, next_fast_len(2 * n, real=True))[:n]
+        kept[:n] += n - np.arange(n)
+    longest = max(2, int(max(lengths)) // 2)
+    covariance = total[:longest] / kept[:longest]
+    if covariance[0] <= 0:
+        return 1.0, 1
+    tau, reach = 1.0, 1
+    for _ in range(10):
+        share = min(removed * tau / len(left), 0.9)
+        rho = (covariance / covariance[0]) * (1 - share) + share
+        reach = int(np.argmax(rho <= 0)) if np.any(rho <= 0) else len(rho)
+        tau = max(1.0, 1 + 2 * float(rho[1:reach].sum()))
+    return tau, reach
+
+
+def means(values: Float[np.ndarray, " N"], labels: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """The mean of each sample's group, at each sample."""
+    return (np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))[labels]
+
+
+def beyond(explained: float, expected: float, total: float) -> float:
+    """Share of `total` explained, corrected for what chance explains: (explained - expected) / (total - expected)."""
+    return min(1.0, max(0.0, (explained - expected) / (total - expected))) if total > expected else 0.0

@@ -1,0 +1,162 @@
+"""What an effect is: a term of the simulation, its bounded parameters, and the words for it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from simgap.records import Kind
+
+Port = Literal["input", "force", "output"]
+# What a force term's number means to the integration: a force; the largest force that dry friction can hold; or
+# what flows out of a tank on top of its linear outflow.
+Role = Literal["force", "friction", "outflow", "rim"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is known of a machine before an effect is fitted to it: sizes in physical units, from the data."""
+
+    kind: Kind
+    order: int
+    dt: float  # s
+    duration: float  # s, of the longest experiment
+    u_low: float  # unit of the input, as are the next two
+    u_high: float
+    u_rms: float
+    y_low: float  # unit of the output, as are the next two
+    y_high: float
+    y_rms: float
+    place: float  # the largest distance from zero
+    rate: float  # the largest velocity
+    travel: float  # the distance between far reversals
+    force: float  # what the input does, rms, in the unit of the highest derivative
+    u_unit: str = ""
+    y_unit: str = ""
+    frequencies: tuple[float, ...] = ()  # Hz, where the error of all experiments has a common line
+    lattice: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
+
+    @property
+    def u_max(self) -> float:
+        """Largest input, either way."""
+        return max(abs(self.u_low), abs(self.u_high))
+
+    def unit(self, place: int, s: int) -> str:
+        """The unit [place]^place s^s, [place] being what the output measures or, for a velocity, its integral."""
+        base, rate = (self.y_unit.removesuffix("/s"), place) if self.y_unit.endswith("/s") else (self.y_unit, 0)
+        if self.kind == "velocity" and not rate:
+            s += place  # the output's unit is that of a velocity whatever it is called
+        if self.kind != "velocity":
+            s -= rate
+        base = f"({base})" if "/" in base else base
+        powers = [(base, place), ("s", s)] if base else [("s", s)]
+        above = [f"{name}^{n}" if n > 1 else name for name, n in powers if n > 0]
+        below = [f"{name}^{-n}" if n < -1 else name for name, n in powers if n < 0]
+        if not below:
+            return " ".join(above)
+        under = below[0] if len(below) == 1 else f"({' '.join(below)})"
+        return f"{' '.join(above) or '1'}/{under}"
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of what acts on the plant: of the highest derivative."""
+        return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
+
+    @property
+    def rate_unit(self) -> str:
+        """Unit of the velocity that the force terms see."""
+        return self.unit(1, -1 if self.order > 1 or self.kind == "velocity" else 0)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect: its unit and its bounds. A fixed one is read off the data and not estimated."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    fixed: bool = False
+
+
+class Start(NamedTuple):
+    """Where a search may begin. `amplitude` is the parameter that the effect is proportional to, if there is one."""
+
+    values: tuple[float, ...]
+    amplitude: int | None = None
+
+
+class Effect(ABC):
+    """A physical effect. Every subclass is final and sits in a file of its own; its texts are class attributes."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    explanation: ClassVar[str]
+    reference: ClassVar[str]
+    port: ClassVar[Port]
+    # The views of what is wrong that show it, most telling first.
+    shows_in: ClassVar[tuple[str, ...]] = ()
+    # Effects that data may not separate from this one, and the experiment that would.
+    twins: ClassVar[dict[str, str]] = {}
+    # The states that the term carries through a simulation.
+    memory: ClassVar[int] = 0
+    # Its parameters belong to one experiment and cannot be forecast.
+    per_experiment: ClassVar[bool] = False
+    # Substeps a sample that its term needs.
+    substeps: ClassVar[int] = 1
+
+    @abstractmethod
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The parameters with bounds that fit the sizes of the scene."""
+
+    @abstractmethod
+    def starts(self, scene: Scene) -> list[Start]:
+        """Points to begin a search from."""
+
+    def suits(self, scene: Scene) -> bool:
+        """Whether the effect makes sense on such a machine."""
+        return True
+
+    def describe(self, values: dict[str, float]) -> str:
+        """The sentence for an engineer: what was found, with the estimated values."""
+        return self.explanation
+
+
+class InputEffect(Effect):
+    """Between the input asked for and the input that arrives."""
+
+    port: ClassVar[Port] = "input"
+
+    @staticmethod
+    @abstractmethod
+    def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
+        """What arrives of u [E, K], piecewise constant over steps of h seconds; the record starts at rest."""
+
+
+class ForceEffect(Effect):
+    """Acts on the plant together with the input."""
+
+    port: ClassVar[Port] = "force"
+    role: ClassVar[Role] = "force"
+    substeps: ClassVar[int] = 4
+    # Compiled by the simulator, called once a substep: x position, v velocity, t seconds since the start, h the
+    # substep; parameters p[i], p[i + 1], ... and memory m[j], ...
+    term: ClassVar[Callable[..., float]]
+
+
+class OutputEffect(Effect):
+    """Between the quantity itself and its reading."""
+
+    port: ClassVar[Port] = "output"
+
+    @staticmethod
+    @abstractmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """The reading of y [E, T] at the times t [T] in s."""
+
+
+MOTION = ("position", "velocity", "other")
