@@ -162,6 +162,8 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
 
     Sizes grow with the strength s; a limit comes down from the full range as full / (1 + s (full / strong - 1)).
     """
+    if rig not in RIGS:
+        raise ValueError(f"there is no rig {rig!r}; known are {', '.join(RIGS)}")
     sizes = {}
     for name, strength in effects.items():
         row = (CATALOGUE | OUTSIDE).get(name)
@@ -212,6 +214,7 @@ def hide(
 
 
 def _top(rig: Rig) -> float:
+    """The largest input, U."""
     return 2 * rig.amplitude if rig.outflow else rig.amplitude
 
 
@@ -219,7 +222,8 @@ def _input(rig: Rig, kind: str, rng: Generator) -> Float[np.ndarray, " T"]:
     """One experiment's input, held from sample to sample, of an amplitude of its own. U."""
     signal = {"steps": _steps, "sines": _sines, "triangle": _triangle, "chirp": _chirp}[kind](rig.samples, rng)
     u = rig.amplitude * rng.uniform(0.5, 1.0) * signal
-    return np.maximum(rig.amplitude + u, 0.0) if rig.outflow else u
+    # A pump neither turns back nor exceeds its supply; both ends are reached, so that levels vary widely.
+    return np.clip(rig.amplitude + 1.3 * u, 0.0, _top(rig)) if rig.outflow else u
 
 
 def _steps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:

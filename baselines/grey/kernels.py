@@ -117,8 +117,11 @@ def run_plant(
                     elif roles[q] == FRICTION:
                         hold += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
                     elif roles[q] == OUTFLOW:
+                        last = rates[n - 1]
                         for i in range(n):
-                            flow = rates[i] * terms[q](z[i], 0.0, t, h, p, p_at[q], memory, m_at[q])
+                            # In units of the last tank's level, so that one law serves tanks of any size.
+                            level = z[i] * rates[i] / (last + 1e-300)
+                            flow = last * terms[q](level, 0.0, t, h, p, p_at[q], memory, m_at[q])
                             force[i] -= flow
                             if i + 1 < n:
                                 force[i + 1] += flow
@@ -135,14 +138,15 @@ def run_plant(
                     new[i] = total
                 if hold > 0.0:
                     gain = g0[fast, entry]
-                    impulse = min(max(-new[fast] / gain, -hold), hold)
+                    impulse = min(max(-new[fast] / (gain + 1e-300), -hold), hold)
                     for i in range(n):
                         new[i] += g0[i, entry] * impulse
                 for q in range(n_terms):
                     if roles[q] == RIM:
                         at = p_at[q]
                         for i in range(n):
-                            rim = p[at] if i == n - 1 else p[at + 1]
+                            # An upper tank's rim is told as the last one's level that it would feed.
+                            rim = p[at] if i == n - 1 else p[at + 1] * rates[n - 1] / (rates[i] + 1e-300)
                             if new[i] > rim:
                                 if i + 1 < n:
                                     new[i + 1] += p[at + 2] * (new[i] - rim)

@@ -149,7 +149,7 @@ class Problem:
             if term in structure.local:
                 continue
             at = structure.term_at(term)
-            starts = [abs(np.array(start.values)) for start in term.effect.starts(structure.scene)]
+            starts = [abs(np.array(start.values)) for start in structure.starts_of(term)]
             if starts:
                 sizes[at] = np.maximum(np.abs(theta[at]), 0.1 * np.median(starts, axis=0) + 1e-12)
         return sizes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
@@ -35,12 +35,40 @@ def fit_plain(structure: Structure, records: Records) -> Estimate:
     return Problem(structure, records, white(deviations)).fit(best.theta, best.local)
 
 
-def poles(structure: Structure, records: Records) -> Iterator[list[float]]:
+def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
+    """The best fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept."""
+    structure, records = problem.structure, problem.records
+    gains = np.zeros(structure.size, dtype=bool)
+    gains[structure.at[1]] = gains[structure.at[2]] = True
+    tried = []
+    for shape in poles(structure, records, coarse=True):
+        for start in starts:
+            theta = start.copy()
+            theta[structure.at[0]] = shape
+            theta[: structure.n_plant] = _same_gain(structure, start, theta)
+            tried.append(problem.fit(theta, fixed=~gains, max_steps=5, tolerance=1.0))
+    tried.sort(key=lambda trial: trial.squares)
+    return min((problem.fit(t.theta, t.local) for t in tried[:FINALISTS]), key=lambda fit: fit.squares)
+
+
+def _same_gain(structure: Structure, before: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """The plant's parameters with other poles and the steady gain of before, at the input's zero."""
+    ratio = abs(np.linalg.det(structure.matrix(theta)) / (np.linalg.det(structure.matrix(before)) or 1.0))
+    if structure.cascade:  # inflow in units of the last tank
+        ratio = theta[structure.order - 1] / (before[structure.order - 1] or 1.0)
+    theta = theta.copy()
+    theta[structure.at[1]] = before[structure.at[1]] * ratio
+    theta[structure.at[2]] = 0.0
+    return theta[: structure.n_plant]
+
+
+def poles(structure: Structure, records: Records, coarse: bool = False) -> Iterator[list[float]]:
     """Shapes from the fastest that the sampling shows to the slowest that the records do."""
     dt, duration = records.dt, records.duration
-    rates = np.geomspace(0.5 / duration, 1.5 / dt, 8)
+    rates = np.geomspace((3 if coarse else 0.5) / duration, (0.3 if coarse else 1.5) / dt, 5 if coarse else 8)
     if structure.cascade:
-        yield from (list(chosen) for chosen in combinations(rates[::-1], structure.order))
+        choose = combinations_with_replacement if coarse else combinations
+        yield from (list(chosen) for chosen in choose(rates[::-1], structure.order))
     elif structure.order == 1:
         yield from ([rate] for rate in rates)
     else:

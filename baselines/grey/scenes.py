@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.grey.least_squares import Estimate, Problem, Records
+from simgap.baselines.grey.structure import Scenes
 from simgap.effects.effect import Scene
 from simgap.records import Channels
 
@@ -14,23 +17,26 @@ LINES = 3
 ON_GRID = 0.999
 
 
-def scene_of(estimate: Estimate, problem: Problem, channels: Channels, u_index: int, y_index: int) -> Scene:
-    """What the effects need to know to choose bounds and starts; u_index counts inputs, y_index the outputs."""
+def scenes_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> Scenes:
+    """What the effects need to know to choose bounds and starts, for each input and each of the plant's outputs."""
     structure, records = estimate.structure, problem.records
     states = problem.simulator.states(estimate.theta, estimate.local[:, : structure.order])[records.mask]  # [N, n]
-    u, y = records.u[records.mask][:, u_index], records.y[records.mask][:, 0]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     place = float(np.max(np.abs(states[:, -1 if structure.cascade else 0])))
     rate = float(np.max(np.abs(states[:, min(1, structure.order - 1)])))
-    input_ = channels.inputs[u_index]
-    return Scene(
-        kind=structure.kind, order=structure.order, dt=structure.dt, duration=records.duration,
-        u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
-        y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
-        place=place or 1.0, rate=rate or 1.0, travel=_travel(structure.order, place, rate, records, states),
-        force=float(np.std(drive)) or 1.0, u_unit=input_.unit, y_unit=channels.outputs[y_index].unit,
-        frequencies=lines(estimate.errors[:, :, 0], records.dt), lattice=lattice(records.y[:, :, 0]),
-    )  # fmt: skip
+
+    def scene(i: int, j: int) -> Scene:
+        u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
+        return Scene(
+            kind=structure.kind, order=structure.order, dt=structure.dt, duration=records.duration,
+            u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
+            y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
+            place=place or 1.0, rate=rate or 1.0, travel=_travel(structure.order, place, rate, records, states),
+            force=float(np.std(drive)) or 1.0, u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
+            frequencies=lines(estimate.errors[:, :, 0], records.dt), lattice=lattice(records.y[:, :, j]),
+        )  # fmt: skip
+
+    return Scenes(tuple(scene(i, 0) for i in range(structure.nu)), tuple(scene(0, j) for j in range(structure.ny)))
 
 
 def _travel(order: int, place: float, rate: float, records: Records, states: np.ndarray) -> float:

@@ -13,18 +13,22 @@ from scipy.stats import chi2
 
 from simgap.baselines.grey.least_squares import Estimate, Problem, Records, Slopes, _Normal
 from simgap.baselines.grey.noise import Noise, estimate, log_likelihood, white
-from simgap.baselines.grey.plain import fit_plain
-from simgap.baselines.grey.scenes import scene_of
+from simgap.baselines.grey.plain import fit_plain, refit_from_poles
+from simgap.baselines.grey.scenes import scenes_of
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure, Term
 from simgap.effects.effect import Start
-from simgap.records import Channels, Experiment, UnusableInput
+from simgap.records import Channels, Experiment
 from simgap.registry import EFFECTS
 
 # The chance, over the whole catalogue, that noise alone passes for an effect.
 FALSE_NAMES = 1e-3
 # What held-out data must add to the log-likelihood: odds of 20 to 1.
 HELD_OUT = 3.0
+# The mean gain of the held-out blocks over its standard error: one in ten by chance.
+CONSISTENT = 1.3
+BLOCKS = 20
 MAX_TERMS = 5
+MAX_ORDER = 4
 MAX_NOISE_ORDER = 3
 STARTS = 2
 # Score tests below this log-likelihood ratio are not worth a refit.
@@ -42,6 +46,7 @@ class Trial:
     k: int  # numbers estimated for all experiments
     k_train: int  # numbers estimated for single training experiments
     k_valid: int
+    blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -81,7 +86,7 @@ class Search:
         held_out = Records.of(valid, outputs) if valid else records
         structure, plain = choose_plain(records, held_out, channels, outputs)
         problem = Problem(structure, records, white(np.ones(structure.ny)))
-        structure = replace(structure, scene=scene_of(plain, problem, channels, 0, outputs[0]))
+        structure = replace(structure, scenes=scenes_of(plain, problem, channels, outputs))
         return cls(records, held_out, channels, tuple(outputs), structure, replace(plain, structure=structure))
 
     # ------------------------------------------------------------------ one model
@@ -102,9 +107,17 @@ class Search:
             log_likelihood(found.errors, self.train.mask, self.noise_order),
             log_likelihood(on_valid.errors, self.valid.mask, self.noise_order),
             int(structure.free.sum()), len(self.train.u) * len(structure.local), len(self.valid.u) * len(structure.local),
+            self._blocks(on_valid.errors),
         )  # fmt: skip
 
-    def fit(self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], noise: Noise | None = None) -> Estimate:
+    def _blocks(self, errors: np.ndarray) -> np.ndarray:
+        white = np.where(self.valid.mask[:, :, None], self.base_noise.whiten(errors), 0.0)
+        per_record = max(2, BLOCKS // len(white))
+        return np.concatenate([block.sum(axis=(1, 2)) for block in np.array_split(white**2, per_record, axis=1)])
+
+    def fit(
+        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], noise: Noise | None = None
+    ) -> Estimate:
         """The best fit of a set of terms from several starts."""
         structure = self.structure.having(terms)
         problem = Problem(structure, self.train, noise or self.base_noise)
@@ -112,19 +125,18 @@ class Search:
 
     # ------------------------------------------------------------------ one round
 
-    def candidates(self, terms: Sequence[Term]) -> list[Term]:
+    def candidates(self, here: Sequence[Term]) -> list[Term]:
         """Every effect that suits the machine and is not in the model, on every channel."""
-        taken = {term.key for term in terms}
-        names = {term.effect.name for term in terms}
+        taken = {term.key for term in here}
+        names = {term.effect.name for term in here}
         found = []
         for name in EFFECTS.names():
             effect = EFFECTS[name]()
-            if name == "outliers" or not effect.suits(self.structure.scene):
-                continue
-            if name == "coulomb_friction" and "stribeck_friction" in names:
+            if name == "outliers" or (name == "coulomb_friction" and "stribeck_friction" in names):
                 continue
             channels = {"input": self.structure.nu, "force": 1, "output": self.structure.ny}[effect.port]
-            found += [term for term in (Term(effect, i) for i in range(channels)) if term.key not in taken]
+            terms = [Term(effect, channel) for channel in range(channels)]
+            found += [t for t in terms if t.key not in taken and effect.suits(self.structure.scenes.of(t))]
         return found
 
     def extend(self, here: Estimate, term: Term, slopes: Slopes) -> Estimate | None:
@@ -133,15 +145,20 @@ class Search:
         structure = self.structure.having([*terms, term])
         if term in structure.local:
             return self.fit(structure.terms, [self.carry(here, structure, term, None)])
+        if term.effect.reshapes:
+            starts = [self.carry(here, structure, term, start)[0] for start in structure.starts_of(term)]
+            return refit_from_poles(Problem(structure, self.train, self.base_noise), starts)
         scored = sorted(self.screen(here, structure, term, slopes), key=lambda pair: -pair[0])
         if not scored:
             return None
-        if scored[0][0] < WORTH_A_REFIT and term.effect.parameters(self.structure.scene):
+        if scored[0][0] < WORTH_A_REFIT:
             return None
         starts = [self.carry(here, structure, term, start) for _, start in scored[:STARTS]]
         return self.fit(structure.terms, starts)
 
-    def carry(self, here: Estimate, structure: Structure, term: Term, start: Start | None) -> tuple[np.ndarray, np.ndarray]:
+    def carry(
+        self, here: Estimate, structure: Structure, term: Term, start: Start | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Theta and local numbers of a smaller model, as the start of a larger one."""
         theta = np.zeros(structure.size)
         theta[: structure.n_plant] = here.theta[: structure.n_plant]
@@ -173,7 +190,7 @@ class Search:
         simulated = base.simulator.run(here.theta, here.local)
         n = self.train.samples * structure.ny
         scored = []
-        for start in term.effect.starts(self.structure.scene):
+        for start in structure.starts_of(term):
             theta, local = self.carry(here, structure, term, start)
             d = extended.simulator.run(theta, local) - simulated
             d = noise.whiten(d * self.train.weights).reshape(e.shape)
@@ -190,7 +207,7 @@ class Search:
             gain = -0.5 * n * math.log(max(1 - along * along / (rest * ee), 1e-12))
             if start.amplitude is not None:
                 values = list(start.values)
-                parameter = term.effect.parameters(self.structure.scene)[start.amplitude]
+                parameter = structure.parameters_of(term)[start.amplitude]
                 moved = values[start.amplitude] * along / rest
                 values[start.amplitude] = float(np.clip(moved, parameter.low, parameter.high))
                 start = Start(tuple(values), start.amplitude)
@@ -252,10 +269,16 @@ class Search:
         extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
         tried = len(self.candidates(smaller.terms)) * STARTS
         chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
-        held_out = larger.valid - smaller.valid - 0.5 * (larger.k_valid - smaller.k_valid) * math.log(
-            self.valid.mask.shape[1]
-        )
-        return bool(chance < FALSE_NAMES and held_out > HELD_OUT)
+        return bool(chance < FALSE_NAMES and self.holds_out(smaller, larger))
+
+    def holds_out(self, smaller: Trial, larger: Trial) -> bool:
+        """Whether the larger model simulates held-out data better, in most of them."""
+        if larger.k_valid > smaller.k_valid:
+            # Estimated anew there, so the gain must pay for that.
+            price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(self.valid.mask.shape[1])
+            return larger.valid - smaller.valid - price > HELD_OUT
+        gain = smaller.blocks - larger.blocks
+        return bool(gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain)))
 
 
 def replaces(new: Term, old: Term) -> bool:
@@ -272,4 +295,24 @@ def choose_plain(
     if kind in ("position", "velocity"):
         structure = Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=len(outputs) == 2)
         return structure, fit_plain(structure, train)
-    raise UnusableInput("not yet")
+    tried = []
+    for order in range(1, MAX_ORDER + 1):
+        for zeros in (0,) if kind == "level" else tuple(range(order)):
+            structure = Structure(kind, order, nu, dt, zeros=zeros, offset=True)
+            fit = fit_plain(structure, train)
+            tried.append((structure, fit, _block_errors(fit, valid)))
+    best = min(tried, key=lambda trial: trial[2].mean())
+    for structure, fit, squares in tried:  # from the simplest on
+        worse = squares - best[2]
+        if worse.mean() <= worse.std() / math.sqrt(len(worse)):
+            return structure, fit
+    return best[:2]
+
+
+def _block_errors(fit: Estimate, valid: Records) -> np.ndarray:
+    """Mean squares of held-out free runs, in about twenty blocks."""
+    fixed = np.ones(fit.structure.size, dtype=bool)
+    errors = Problem(fit.structure, valid, white(np.ones(1))).fit(fit.theta, fixed=fixed, max_steps=10).errors
+    squares = np.where(valid.mask[:, :, None], errors**2, 0.0)
+    blocks = np.array_split(squares, max(2, 20 // len(squares)), axis=1)
+    return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

@@ -10,7 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simgap.effects.effect import Effect, ForceEffect, Parameter, Scene
+from simgap.effects.effect import Effect, ForceEffect, Parameter, Scene, Start
 from simgap.records import Kind
 
 # Where two input effects, or two output effects, meet: the order in which a signal passes them.
@@ -20,6 +20,19 @@ INPUT_CHAIN = (
 OUTPUT_CHAIN = ("sensor_lag", "absolute_sensor", "sensor_saturation", "quantisation", "outliers")
 # Added to the reading of one experiment: time to this power.
 LOCAL_POWERS = {"sensor_bias": 0, "sensor_drift": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """The sizes that each input sees, and each output; forces see those of the first of both."""
+
+    inputs: tuple[Scene, ...]
+    outputs: tuple[Scene, ...]
+
+    def of(self, term: Term) -> Scene:
+        """What a term sees."""
+        port = term.effect.port
+        return self.inputs[term.channel] if port == "input" else self.outputs[term.channel if port == "output" else 0]
 
 
 @dataclass(frozen=True)
@@ -53,7 +66,7 @@ class Structure:
     zeros: int = 0
     two_outputs: bool = False
     offset: bool = False
-    scene: Scene = None  # type: ignore[assignment]  # needed as soon as there are terms
+    scenes: Scenes = None  # type: ignore[assignment]  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
 
     @property
@@ -75,7 +88,7 @@ class Structure:
     def widths(self) -> tuple[int, ...]:
         """Sizes of the parts of theta."""
         plant = (self.order, self.nu, int(self.offset), self.zeros, int(self.two_outputs))
-        return plant + tuple(0 if t in self.local else len(t.effect.parameters(self.scene)) for t in self.terms)
+        return plant + tuple(0 if t in self.local else len(self.parameters_of(t)) for t in self.terms)
 
     @cached_property
     def at(self) -> tuple[slice, ...]:
@@ -92,6 +105,14 @@ class Structure:
     def size(self) -> int:
         """Length of theta."""
         return sum(self.widths)
+
+    def parameters_of(self, term: Term) -> tuple[Parameter, ...]:
+        """The parameters of a term, with bounds."""
+        return term.effect.parameters(self.scenes.of(term))
+
+    def starts_of(self, term: Term) -> list[Start]:
+        """Where a search for a term may begin."""
+        return term.effect.starts(self.scenes.of(term))
 
     def term_at(self, term: Term) -> slice:
         """Where the parameters of a term stand in theta."""
@@ -127,7 +148,7 @@ class Structure:
         plant += [Parameter("g", "", -inf, inf)] * self.two_outputs
         for term in self.terms:
             if term not in self.local:
-                plant += term.effect.parameters(self.scene)
+                plant += self.parameters_of(term)
         return tuple(plant)
 
     @property

@@ -141,10 +141,10 @@ def _by_size(
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)
     rms = np.sqrt(squared / count)
     high, low = int(np.argmax(rms)), int(np.argmin(rms))
-    unit = e.channel.unit
+    most, least = amount(rms[high], e.channel.unit), amount(rms[low], e.channel.unit)
     text = (
-        f"The RMS error of {e.channel.name} is {amount(rms[high], unit)} in {labels[high]} and {amount(rms[low], unit)} "
-        f"in {labels[low]}: those above the average hold {percent(share)} of the squared error beyond their part."
+        f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
+        f"those above the average hold {percent(share)} of the squared error beyond their part."
     )
     return View(view, e.channel.name, share, p, text, _counted(rms), _floats(rms), "")
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -23,7 +24,7 @@ REST = 0.02  # of the RMS velocity; slower is at rest
 class Bins:
     """Samples sorted into bins: the bin of each (-1: none), the centres [unit of the variable], the places in words.
 
-    `ends` are the limits of each bin, infinite at the outer ones; `parents` the coarser bin of each, where there is one.
+    `ends` are the limits of each bin, infinite at the outer ones; `parents` the coarser bin of each, where it has one.
     """
 
     labels: Int[np.ndarray, " N"]
@@ -57,7 +58,7 @@ def bin_values(values: Float[np.ndarray, " N"], name: str, unit: str, most: int 
     centres = np.bincount(inside, used) / count
     single = few and len(edges) == len(distinct) - 1
     outer = [-np.inf, *map(float, edges), np.inf]
-    ends = tuple(zip(outer[:-1], outer[1:], strict=True))
+    ends = tuple(pairwise(outer))
     labels = np.full(len(values), -1)
     labels[known] = inside
     places = [amount(value, unit, 3) for value in distinct] if single else [between(*limits, unit) for limits in ends]

@@ -10,8 +10,14 @@ from jaxtyping import Float
 from simgap.diagnosis import chance, trends
 from simgap.diagnosis.errors import Errors, View, errors
 from simgap.diagnosis.variables import (
-    Bins, amplitude, bin_direction, bin_reversals, bin_values, by_experiment, derivative,
-)  # fmt: skip
+    Bins,
+    amplitude,
+    bin_direction,
+    bin_reversals,
+    bin_values,
+    by_experiment,
+    derivative,
+)
 from simgap.diagnosis.wording import off, percent, rate
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment

@@ -21,6 +21,7 @@ class AbsoluteSensor(OutputEffect):
         "The sensor shows the size but not the direction: a tachometer that counts pulses, a rectifier."
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Coupled electric drives, Uppsala University TR 2017-024"
+    reshapes: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "position")
     twins: ClassVar[dict[str, str]] = {
         "sensor_saturation": "move slowly through zero: a saturated reading stays there, a rectified one bounces",

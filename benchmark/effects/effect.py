@@ -106,6 +106,8 @@ class Effect(ABC):
     memory: ClassVar[int] = 0
     # Its parameters belong to one experiment and cannot be forecast.
     per_experiment: ClassVar[bool] = False
+    # The linear plant fitted without it has other poles, so that a search with it looks for them anew.
+    reshapes: ClassVar[bool] = False
     # Substeps a sample that its term needs.
     substeps: ClassVar[int] = 1
 

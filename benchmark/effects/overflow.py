@@ -21,6 +21,7 @@ class Overflow(ForceEffect):
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
     role: ClassVar[Role] = "rim"
+    reshapes: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
     twins: ClassVar[dict[str, str]] = {
         "sensor_saturation": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor only when "
@@ -34,7 +35,9 @@ class Overflow(ForceEffect):
         last = Parameter("rim", scene.y_unit, 0.3 * scene.y_high, 1.5 * scene.y_high)
         if scene.order == 1:
             return (last,)
-        above = Parameter("rim of the upper tank", scene.y_unit, 0.2 * scene.y_high, 3 * scene.y_high)
+        above = Parameter(
+            "rim of the upper tank, as the level it would feed", scene.y_unit, 0.2 * scene.y_high, 3 * scene.y_high
+        )
         return (last, above, Parameter("share caught below", "", 0.0, 1.0))
 
     def starts(self, scene: Scene) -> list[Start]:
@@ -44,8 +47,7 @@ class Overflow(ForceEffect):
             return [Start((met,)), Start((0.9 * met,))]
         return [
             Start((last, above, caught))
-            for last, above in ((met, 2 * never), (never, 0.7 * met), (never, met), (met, met))
-            for caught in (0.3, 0.8)
+            for last, above, caught in ((met, 2 * never, 0.5), (never, met, 0.3), (never, met, 0.8), (met, met, 0.8))
         ]
 
     def suits(self, scene: Scene) -> bool:

@@ -21,6 +21,7 @@ class SqrtOutflow(ForceEffect):
     )
     reference: ClassVar[str] = "Torricelli 1643; Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
     role: ClassVar[Role] = "outflow"
+    reshapes: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
     twins: ClassVar[dict[str, str]] = {
         "overflow": "fill it slowly past the largest level: only an overflow stops the rise",
