@@ -111,7 +111,10 @@ def arriving(drive, u, dt, substeps):
 @njit(cache=True)
 def friction(p, v):
     """Size of the dry friction of a moving body, and at v = 0 the force at which it breaks away."""
-    return p.coulomb + p.stribeck * (1.0 + (p.breakaway - 1.0) * exp(-((v / p.stribeck_velocity) ** 2)))
+    size = p.coulomb
+    if p.stribeck != 0.0:
+        size += p.stribeck * (1.0 + (p.breakaway - 1.0) * exp(-((v / p.stribeck_velocity) ** 2)))
+    return size
 
 
 @njit(cache=True)
@@ -119,10 +122,15 @@ def force(p, w, other, t, x, v, z):
     """All forces but dry friction; w and `other`, a force from outside, are those of the time t."""
     total = other + p.load - v * (p.damping + p.drag * abs(v)) - p.hysteresis * z
     total -= x * (p.stiffness + x * (p.stiffness2 + x * p.stiffness3))
-    total += p.gain * w * (1.0 + p.ripple * sin(2 * pi * x / p.ripple_period))
     total += p.push * v * (1.0 - (x / p.push_width) ** 2)
-    total -= p.position_force * sin(2 * pi * x / p.position_period + p.position_phase)
-    return total + p.periodic * sin(2 * pi * p.frequency * t + p.phase)
+    gain = p.gain
+    if p.ripple != 0.0:  # sines are what costs time here
+        gain *= 1.0 + p.ripple * sin(2 * pi * x / p.ripple_period)
+    if p.position_force != 0.0:
+        total -= p.position_force * sin(2 * pi * x / p.position_period + p.position_phase)
+    if p.periodic != 0.0:
+        total += p.periodic * sin(2 * pi * p.frequency * t + p.phase)
+    return total + gain * w
 
 
 @njit(cache=True)
@@ -201,7 +209,9 @@ def leaving(p, rate, level, reference):
 @njit(cache=True)
 def flows(p, w, other, t, lower, upper):
     """d/dt of the two levels below the rim."""
-    inflow = p.gain * w + other + p.periodic * sin(2 * pi * p.frequency * t + p.phase)
+    inflow = p.gain * w + other
+    if p.periodic != 0.0:
+        inflow += p.periodic * sin(2 * pi * p.frequency * t + p.phase)
     out = leaving(p, p.outflow, lower, p.level)
     if p.upper == 0.0:
         return inflow - out, 0.0

@@ -25,7 +25,7 @@ SUBSTEPS = 20  # of the integration, per sample
 
 @dataclass(frozen=True)
 class Rig:
-    """A plant before anything is hidden in it. L is the unit of its first output, U that of its input.
+    """A plant before anything is hidden in it. U is its unit of input, L of length or level, Y of its first output.
 
     With `outflow` 0 it is a body: x'' = gain u - damping x' - stiffness x. Otherwise it is a tank, level' =
     gain u - outflow level, or two, of which the lower is measured.
@@ -37,7 +37,7 @@ class Rig:
     outputs: tuple[Channel, ...]
     gain: float  # L/s^2 per U; tanks: L/s per U
     amplitude: float  # U, the largest input; tanks: around an operating point of the same size
-    reach: float  # L, about the largest reading of the first output
+    reach: float  # Y, about the largest reading of the first output
     damping: float = 0.0  # 1/s
     stiffness: float = 0.0  # 1/s^2
     outflow: float = 0.0  # 1/s
@@ -51,7 +51,7 @@ class Rig:
     hysteresis_width: float = 1.0  # L
     push_width: float = 1.0  # L
     frequency: float = 1.0  # Hz, of the periodic disturbance
-    outlier: float = 1.0  # L
+    outlier: float = 1.0  # Y
     n_train: int = 8
     n_valid: int = 4
     n_test: int = 4
@@ -107,7 +107,7 @@ class Hidden(NamedTuple):
     """The size of an effect at strength 1 on each rig, None where it makes no sense; `field` is where it acts."""
 
     field: str
-    unit: str  # L: of the first output, U: of the input
+    unit: str  # U: of the input, Y: of the first output, L: of length or level
     cart: float | None
     stage: float | None
     slide: float | None
@@ -134,12 +134,12 @@ CATALOGUE = {
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),
     "sqrt_outflow": Hidden("root", "share", None, None, None, 1.0, 1.0),
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
-    "sensor_drift": Hidden("drift", "L/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
-    "sensor_bias": Hidden("bias", "L, standard deviation", 0.3, 2.0, 3.0, 0.9, 1.2),
-    "sensor_saturation": Hidden("sensor_limit", "L, each way", 0.5, 4.0, 7.0, 11.0, 11.0),
+    "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
+    "sensor_bias": Hidden("bias", "Y, standard deviation", 0.3, 2.0, 3.0, 0.9, 1.2),
+    "sensor_saturation": Hidden("sensor_limit", "Y, each way", 0.5, 4.0, 7.0, 11.0, 11.0),
     "sensor_lag": Hidden("sensor_lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
     "absolute_sensor": Hidden("absolute", "", 1.0, 1.0, 1.0, None, None),
-    "quantisation": Hidden("step", "L", 0.6, 4.0, 7.0, 2.5, 3.0),
+    "quantisation": Hidden("step", "Y", 0.6, 4.0, 7.0, 2.5, 3.0),
     "outliers": Hidden("outlier_rate", "share of the samples", 0.02, 0.02, 0.02, 0.02, 0.02),
 }
 OUTSIDE = {  # no diagnosis knows these by name
@@ -174,7 +174,7 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
         sizes[name] = strength * strong
         if row.field in {"limit", "sensor_limit", "rim"}:
             full = _top(RIGS[rig]) if row.field == "limit" else RIGS[rig].reach
-            sizes[name] = full / (1 + strength * (full / strong - 1))
+            sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":
             sizes[name] = 1.0
     return sizes
@@ -194,8 +194,8 @@ def hide(
     AR(1) coefficient from sample to sample. The sensors' effects hit the first output only. Inputs, initial
     states and noise draws depend on rig and seed alone.
     """
-    plant = RIGS[rig]
     size = {(CATALOGUE | OUTSIDE)[name].field: value for name, value in physical(rig, effects).items()}
+    plant = RIGS[rig]
     counts = (plant.n_train, plant.n_valid, plant.n_test)
     # The seed of an experiment is its place in its split, so that no split depends on the size of another.
     places = [(split, number) for split, count in enumerate(counts) for number in range(count)]
@@ -258,20 +258,19 @@ def _motion(
 ) -> Float[np.ndarray, "n ny"]:
     """The true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
     other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
-    drive = Drive(*(size.get(field, 0.0) for field in Drive._fields))._replace(
-        amplitude=_top(rig), limit=size.get("limit", inf)
-    )
+    known = {"amplitude": _top(rig), "limit": size.get("limit", inf)}
+    drive = Drive(**{field: known.get(field, size.get(field, 0.0)) for field in Drive._fields})
     offset, middle = rig.start * np.clip(start_rng.standard_normal(2), -2, 2), rig.middle
-    begin = [float(value) for value in offset + middle]
+    first, second = (float(value) for value in offset + middle)
     if rig.outflow:
         known = {"gain": rig.gain, "outflow": rig.outflow, "upper": rig.upper, "rim": size.get("rim", inf)}
         known |= {"level": middle[0], "upper_level": middle[1], "spill": 0.5, "frequency": rig.frequency, "phase": 0.7}
-        tanks = Tanks(*({**dict.fromkeys(Tanks._fields, 0.0), **size, **known}[field] for field in Tanks._fields))
-        return fill(tanks, drive, u, other, *begin, rig.dt, substeps)[:, :1].copy()
+        tanks = Tanks(**{field: known.get(field, size.get(field, 0.0)) for field in Tanks._fields})
+        return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
     known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
     known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7}
-    body = Body(*({**dict.fromkeys(Body._fields, 0.0), **size, **known}[field] for field in Body._fields))
-    motion = move(body, drive, u, other, *begin, rig.dt, substeps)
+    body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
+    motion = move(body, drive, u, other, first, second, rig.dt, substeps)
     return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]
 
 

@@ -74,7 +74,6 @@ class Estimate:
     local: Float[np.ndarray, "E q"]
     errors: Float[np.ndarray, "E T ny"]
     squares: float
-    information: Float[np.ndarray, "p p"]
     converged: bool
 
 
@@ -175,8 +174,10 @@ class Problem:
         errors = self.errors(theta, local)
         squares, damping, converged = self.squares(errors), 1e-3, False
         experiments = len(local)
-        for _ in range(max_steps):
+        for _ in range(max_steps if np.isfinite(squares) else 0):
             slopes = self.slopes(theta, local, free)
+            if not (np.isfinite(slopes.theta).all() and np.isfinite(slopes.local).all()):
+                break
             white = self.noise.whiten(errors).reshape(experiments, -1)  # [E, M]
             normal = _Normal.of(slopes, white)
             inside = free & ~((theta <= low) & (normal.gradient < 0)) & ~((theta >= high) & (normal.gradient > 0))
@@ -202,9 +203,13 @@ class Problem:
             if crawls:
                 converged = True
                 break
-        slopes = self.slopes(theta, local, free)
-        normal = _Normal.of(slopes, self.noise.whiten(errors).reshape(experiments, -1))
-        return Estimate(structure, theta, local, errors, squares, normal.information, converged)
+        return Estimate(structure, theta, local, errors, squares, converged)
+
+    def information(self, found: Estimate) -> Float[np.ndarray, "p p"]:
+        """J' J of theta, less what the local numbers take of it."""
+        slopes = self.slopes(found.theta, found.local, self.structure.free)
+        white = self.noise.whiten(found.errors).reshape(len(found.local), -1)
+        return _Normal.of(slopes, white).information
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,8 @@ HELD_OUT = 3.0
 # The mean gain of the held-out blocks over its standard error: one in ten by chance.
 CONSISTENT = 1.3
 BLOCKS = 20
+# Log-likelihood ratio that confirms what the readings show already.
+OBVIOUS = 8.0
 MAX_TERMS = 5
 MAX_ORDER = 4
 MAX_NOISE_ORDER = 3
@@ -235,8 +237,7 @@ class Search:
 
     def run(self) -> Search:
         """Forward steps while noise alone would not do as well, then exchange, then what is not needed out again."""
-        here = self.assess(self.plain)
-        self.path = [here]
+        here = self.look(self.assess(self.plain))
         while len(here.terms) < MAX_TERMS:
             trials = self.round(here.estimate)
             if trials:
@@ -250,6 +251,19 @@ class Search:
             here = better[0]
             self.path.append(here)
         return self
+
+    def look(self, here: Trial) -> Trial:
+        """What the readings themselves show, before the errors of any model are asked."""
+        self.path = [here]
+        slopes = Slopes(np.zeros((0, 0, 0)), np.zeros((0, 0, 0)))
+        for term in self.candidates(()):
+            if term.effect.obvious:
+                fit = self.extend(here.estimate, term, slopes)
+                trial = self.assess(fit) if fit is not None else here
+                if trial.train - here.train > OBVIOUS and self.holds_out(here, trial):
+                    here = trial
+                    self.path.append(here)
+        return here
 
     def _again(self, trial: Trial) -> Trial:
         return self.assess(trial.estimate)

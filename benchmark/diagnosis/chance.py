@@ -10,8 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.fft import dct, irfft, next_fast_len, rfft
+from scipy.fft import dct
 from scipy.stats import beta, f
+
+from simgap.diagnosis.correlation import correlation_time, means
 
 DRAWS = 1000  # of random signs
 LARGE = 256  # terms that get them one by one
@@ -55,7 +57,7 @@ def by_bins(
     terms = cosines(indicator, lengths) * cosines(centred[:, None], lengths) @ root  # c_k i_k' root [N, B]
     explained = float(sums @ form @ sums)
     drawn = (_random_sums(terms, np.random.default_rng(seed)) ** 2).sum(axis=1)
-    chance = (1 + np.count_nonzero(drawn >= explained * (1 - 1e-9))) / (1 + DRAWS)
+    chance = (1 + int(np.count_nonzero(drawn >= explained * (1 - 1e-9)))) / (1 + DRAWS)
     return beyond(explained, float((terms**2).sum()), float(error @ error)), chance
 
 
@@ -84,10 +86,9 @@ def by_trend(
     """The same for what is slow itself: `fitted` holds means of whole experiments or stretches of time, or lines.
 
     F = (Q / p) / (tau R / (N - tau q)), with Q = |fitted|^2, R what is left, p = `added` the degrees of freedom of
-    `fitted`, q = `removed` those plus what was taken out before, and tau the correlation time of what is
-    left [samples].
-    Random signs of cosines would keep a slow trend slow and call every trend chance: here the trend is the question,
-    so chance is noise with the correlation that remains once the trend is gone.
+    `fitted`, q = `removed` those plus what was taken out before, and tau the correlation time of what
+    is left [samples]. Random signs would keep a slow trend slow and call every trend chance. Here the trend is the
+    question, so chance is noise with the correlation that remains once the trend is gone.
     """
     left = error - fitted
     # Offsets of experiments are a view of their own; left in, they would pass for correlation within each of them.
@@ -137,15 +138,6 @@ def by_size(size: Float[np.ndarray, " n"], group: Int[np.ndarray, " n"], seed: i
     return beyond(float(excess[0]), float(excess[1:].mean()), 1.0), float(chance)
 
 
-def blocks(error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean squares of blocks of each experiment, longer than their correlation, and the experiment of each block."""
-    squared, lengths = error**2 / np.mean(error**2), np.bincount(experiment)
-    reach = correlation_time(squared - means(squared, experiment), lengths, len(lengths))[1]
-    whole = [part[: len(part) // (2 * reach) * 2 * reach] for part in np.split(squared, np.cumsum(lengths)[:-1])]
-    sizes = [part.reshape(-1, 2 * reach).mean(axis=1) for part in whole]
-    return np.concatenate(sizes), np.repeat(np.arange(len(sizes)), [len(part) for part in sizes])
-
-
 def by_bands(power: Float[np.ndarray, " F"], band: Int[np.ndarray, " F"]) -> tuple[int, float, float]:
     """The band that holds most of the power above its width, the share above its width, and its chance in white noise.
 
@@ -166,39 +158,7 @@ def by_bands(power: Float[np.ndarray, " F"], band: Int[np.ndarray, " F"]) -> tup
 def cosines(columns: Float[np.ndarray, "N m"], lengths: Sequence[int]) -> Float[np.ndarray, "N m"]:
     """Orthonormal cosine transform of each column, experiment by experiment."""
     parts = np.split(columns, np.cumsum(lengths)[:-1])
-    return np.concatenate([dct(part, axis=0, norm="ortho") for part in parts])
-
-
-def correlation_time(
-    left: Float[np.ndarray, " N"], lengths: Sequence[int] | np.ndarray, removed: int
-) -> tuple[float, int]:
-    """Samples that count as one: tau = 1 + 2 sum_k rho_k up to the first rho_k that is not positive, at least 1.
-
-    `removed` means were taken out of `left`. That lowers every autocovariance by about removed tau / N of the
-    variance, which is put back; without it slow noise looks faster than it is.
-    """
-    total, kept = np.zeros(max(lengths)), np.zeros(max(lengths))
-    for part in np.split(left, np.cumsum(lengths)[:-1]):
-        n = len(part)
-        spectrum = np.abs(rfft(part, next_fast_len(2 * n, real=True))) ** 2
-        total[:n] += irfft(spectrum, next_fast_len(2 * n, real=True))[:n]
-        kept[:n] += n - np.arange(n)
-    longest = max(2, int(max(lengths)) // 2)
-    covariance = total[:longest] / kept[:longest]
-    if covariance[0] <= 0:
-        return 1.0, 1
-    tau, reach = 1.0, 1
-    for _ in range(10):
-        share = min(removed * tau / len(left), 0.9)
-        rho = (covariance / covariance[0]) * (1 - share) + share
-        reach = int(np.argmax(rho <= 0)) if np.any(rho <= 0) else len(rho)
-        tau = max(1.0, 1 + 2 * float(rho[1:reach].sum()))
-    return tau, reach
-
-
-def means(values: Float[np.ndarray, " N"], labels: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """The mean of each sample's group, at each sample."""
-    return (np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))[labels]
+    return np.concatenate([np.asarray(dct(part, axis=0, norm="ortho")) for part in parts])
 
 
 def beyond(explained: float, expected: float, total: float) -> float:

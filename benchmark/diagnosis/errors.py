@@ -19,7 +19,8 @@ class View:
     explain beyond chance; `chance` is how often chance alone explains as much (p-value, for this view by itself).
     `text` says it in a sentence. For plots: `at` holds the bins' centres, in `unit`, and `error` the mean errors
     there (the RMS errors for bands and sizes), in the unit of the output. For "experiment" and its relatives `at`
-    counts experiments (or their kinds) from 1, and the halves of experiment i are at i - 0.25 and i + 0.25.
+    counts experiments (or their kinds) from 1, and the halves of experiment i are at i - 0.25 and i + 0.25. The offset
+    is at 0; directions are -1 (back), 0 (rest) and 1 (forwards).
     """
 
     view: str

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Int
 
 from simgap.diagnosis import chance
+from simgap.diagnosis.correlation import blocks, means
 from simgap.diagnosis.errors import Errors, View
 from simgap.diagnosis.variables import bin_values
 from simgap.diagnosis.wording import amount, between, number, off, percent, rate, span
@@ -37,7 +38,7 @@ def time_since_start(e: Errors) -> Iterator[View]:
     if bins is None:
         return
     n, removed = len(bins.centres), len(e.lengths) + len(bins.centres) - 1
-    fitted = chance.means(e.error - chance.means(e.error, e.experiment), bins.labels)
+    fitted = means(e.error - means(e.error, e.experiment), bins.labels)
     share, p = chance.by_trend(e.error, fitted, n - 1, removed, e.experiment)
     mean = np.bincount(bins.labels, e.error) / np.bincount(bins.labels)
     rms = np.sqrt(np.bincount(bins.labels, e.error**2) / np.bincount(bins.labels))
@@ -77,11 +78,11 @@ def experiments(e: Errors) -> Iterator[View]:
     names, count = e.names, len(e.names)
     if count < 2:
         return
-    fitted = chance.means(e.error, e.experiment) - e.error.mean()
+    fitted = means(e.error, e.experiment) - e.error.mean()
     found = chance.by_trend(e.error, fitted, count - 1, count, e.experiment)
     everyone = np.arange(count)
     yield _by_mean(e, "experiment", names, everyone, *found)
-    sizes, owner = chance.blocks(e.error, e.experiment)
+    sizes, owner = blocks(e.error, e.experiment)
     if np.bincount(owner, minlength=count).min() > 1:
         yield _by_size(e, "size by experiment", names, everyone, *chance.by_size(sizes, owner, e.seed))
     suffixes = [name.rsplit("_", 1)[-1] if "_" in name else "" for name in names]

@@ -21,6 +21,7 @@ class AbsoluteSensor(OutputEffect):
         "The sensor shows the size but not the direction: a tachometer that counts pulses, a rectifier."
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Coupled electric drives, Uppsala University TR 2017-024"
+    obvious: ClassVar[bool] = True
     reshapes: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "position")
     twins: ClassVar[dict[str, str]] = {
@@ -36,8 +37,8 @@ class AbsoluteSensor(OutputEffect):
         return [Start(())]
 
     def suits(self, scene: Scene) -> bool:
-        """Where no reading is below zero, as far as noise lets one say."""
-        return scene.y_low > -0.25 * scene.y_high
+        """Where no reading is below zero but for noise, though the input takes both signs."""
+        return scene.y_low > -0.15 * scene.y_high and scene.u_low < -0.2 * scene.u_max and scene.u_high > 0.2 * scene.u_max
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

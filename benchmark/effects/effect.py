@@ -108,6 +108,8 @@ class Effect(ABC):
     per_experiment: ClassVar[bool] = False
     # The linear plant fitted without it has other poles, so that a search with it looks for them anew.
     reshapes: ClassVar[bool] = False
+    # Readings that suit it are evidence by themselves: it is tried before anything else.
+    obvious: ClassVar[bool] = False
     # Substeps a sample that its term needs.
     substeps: ClassVar[int] = 1
 

@@ -93,7 +93,7 @@ def test_the_same_seed_gives_the_same_data_and_another_seed_other_data():
     one = hide("stage", effects, seed=1)
     assert one.sha256 == hide("stage", effects, seed=1).sha256 != hide("stage", effects, seed=2).sha256
     assert len({experiment.u.tobytes() for experiment in experiments(one)}) == 16
-    assert len({float(y[0]) for y in (experiment.y[0, 0] for experiment in experiments(one))}) == 16
+    assert len({experiment.y[0, 0] for experiment in experiments(one)}) == 16
 
 
 def test_the_data_have_the_shape_that_is_promised():
@@ -143,8 +143,9 @@ def test_a_tank_that_overflows_never_stands_above_its_rim(rig):
         level = clean(rig, "overflow", strength)
         assert level.max() == rim
         assert np.sum(level == rim) > 20
-        # What was lost is lost: some time after the rim the level is still below that of a tank without one.
-        assert np.all(level <= clean(rig) + 1e-12)
+        # What was lost is lost: long after the rim the level is still below that of a tank without one. What the
+        # upper of two tanks spills, however, is in the lower one sooner than what goes its proper way.
+        assert rig == "tanks" or np.all(level <= clean(rig) + 1e-12)
         assert np.sum((level < clean(rig) - 0.1) & (level < rim)) > 20
 
 
@@ -153,9 +154,8 @@ def test_the_root_of_the_level_empties_a_tank_as_torricelli_says():
     h = forced("tank", "sqrt_outflow")[:, 0]
     u = hide("tank", {}).training.train[0].u[:, 0]
     rate = rig.gain * u - rig.outflow * np.sqrt(h * rig.middle[0])
-    smooth = slice(1, -1)
     held = u[:-2] == u[1:-1]
-    assert ((h[2:] - h[:-2]) / (2 * rig.dt))[held] == pytest.approx(rate[smooth][held], abs=2e-4)
+    assert ((h[2:] - h[:-2]) / (2 * rig.dt))[held] == pytest.approx(rate[1:-1][held], abs=1e-3 * np.abs(rate).max())
 
 
 @pytest.mark.parametrize(("rig", "effect", "column"), [("cart", "sensor_bias", 0), ("slide", "sensor_drift", 0)])
