@@ -78,38 +78,43 @@ def transition(a, h, e, g0, g1):
 
 @njit(
     types.void(
-        _matrix, _matrix, _matrix, types.float64[::1], types.int64, types.int64, _matrix, _matrix,
+        _cube, _cube, _cube, _matrix, types.int64, types.int64, _cube, _cube,
         types.int64, types.float64, types.UniTuple(types.FunctionType(TERM), SLOTS), types.int64, _places,
-        types.float64[::1], _places, _places, types.float64[::1], _cube,
+        _matrix, _places, _places, types.float64[::1], types.float64[:, :, :, ::1],
     ),
     cache=True, nogil=True,
 )  # fmt: skip
 def run_plant(
-    e, g0, g1, rates, entry, fast, drive, start, substeps, h, terms, n_terms, roles, p, p_at, m_at, memory, states
-):
-    """Fill states [E, T, n] from start [E, n] and the drive [E, T * substeps], constant over each substep.
+    es, g0s, g1s, rates, entry, fast, drive, start, substeps, h, terms, n_terms, roles, thetas, p_at, m_at, memory,
+    states,
+):  # fmt: skip
+    """Fill states [S, E, T, n] of S parameter vectors thetas [S, p] from start [S, E, n].
 
-    Linear parts are exact; forces are extrapolated linearly over a substep (exponential Adams-Bashforth of order 2);
-    dry friction is the impulse within its bound that brings the velocity nearest to zero (Moreau 1988), so that it
-    sticks without events.
+    The drive [S, E, T * substeps] is constant over each substep. Linear parts are exact; forces are extrapolated
+    linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound
+    that brings the velocity nearest to zero (Moreau 1988), so that it sticks without events.
     """
-    experiments, samples, n = states.shape
+    _, experiments, samples, n = states.shape
     z, new = np.empty(n), np.empty(n)
     force, before = np.empty(n), np.empty(n)
-    for experiment in range(experiments):
+    for run in range(len(states) * experiments):
+        s, experiment = run // experiments, run % experiments
+        e, g0, g1, p = es[s], g0s[s], g1s[s], thetas[s]
         for i in range(n):
-            z[i] = start[experiment, i]
-        memory[:] = 0.0
-        first = True
+            z[i] = start[s, experiment, i]
+            before[i] = 0.0
+        for i in range(len(memory)):
+            memory[i] = 0.0
         step = 0
         for k in range(samples):
             for i in range(n):
-                states[experiment, k, i] = z[i]
+                states[s, experiment, k, i] = z[i]
             if k == samples - 1:
                 break
             for _ in range(substeps):
                 t = step * h
-                force[:] = 0.0
+                for i in range(n):
+                    force[i] = 0.0
                 hold = 0.0
                 for q in range(n_terms):
                     if roles[q] == FORCE:
@@ -117,28 +122,25 @@ def run_plant(
                     elif roles[q] == FRICTION:
                         hold += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
                     elif roles[q] == OUTFLOW:
-                        last = rates[n - 1]
+                        last = rates[s, n - 1]
                         for i in range(n):
                             # In units of the last tank's level, so that one law serves tanks of any size.
-                            level = z[i] * rates[i] / (last + 1e-300)
+                            level = z[i] * rates[s, i] / (last + 1e-300)
                             flow = last * terms[q](level, 0.0, t, h, p, p_at[q], memory, m_at[q])
                             force[i] -= flow
                             if i + 1 < n:
                                 force[i + 1] += flow
-                if first:
-                    before[:] = force
-                    first = False
                 for i in range(n):
-                    total = g0[i, entry] * drive[experiment, step]
+                    total = g0[i, entry] * drive[s, experiment, step]
                     for j in range(n):
                         total += e[i, j] * z[j]
                     if n_terms > 0:
                         for j in range(n):
-                            total += g0[i, j] * force[j] + g1[i, j] * (force[j] - before[j])
+                            change = force[j] - before[j] if step > 0 else 0.0
+                            total += g0[i, j] * force[j] + g1[i, j] * change
                     new[i] = total
                 if hold > 0.0:
-                    gain = g0[fast, entry]
-                    impulse = min(max(-new[fast] / (gain + 1e-300), -hold), hold)
+                    impulse = min(max(-new[fast] / (g0[fast, entry] + 1e-300), -hold), hold)
                     for i in range(n):
                         new[i] += g0[i, entry] * impulse
                 for q in range(n_terms):
@@ -146,11 +148,11 @@ def run_plant(
                         at = p_at[q]
                         for i in range(n):
                             # An upper tank's rim is told as the last one's level that it would feed.
-                            rim = p[at] if i == n - 1 else p[at + 1] * rates[n - 1] / (rates[i] + 1e-300)
+                            rim = p[at] if i == n - 1 else p[at + 1] * rates[s, n - 1] / (rates[s, i] + 1e-300)
                             if new[i] > rim:
                                 if i + 1 < n:
                                     new[i + 1] += p[at + 2] * (new[i] - rim)
                                 new[i] = rim
-                z[:] = new
-                before[:] = force
+                for i in range(n):
+                    z[i], before[i] = new[i], force[i]
                 step += 1

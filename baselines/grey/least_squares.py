@@ -110,34 +110,37 @@ class Problem:
 
     def slopes(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Slopes:
         """Slopes of the simulation by forward differences, for the parameters `which` of theta."""
-        structure, here = self.structure, self.simulator.run(theta, local)
+        structure, which = self.structure, np.flatnonzero(which)
+        sizes, high = self.sizes(theta), structure.high
+        steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
+        starts = [DIFFERENCE * self._spread[0] * (structure.dt**-i if not structure.cascade else 1.0)
+                  for i in range(structure.order)]  # fmt: skip
+        thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
+        locals_ = np.repeat(local[None], len(thetas), axis=0)
+        for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
+            thetas[row, i] += step
+        for i, step in enumerate(starts):
+            locals_[1 + len(steps) + i, :, i] += step
+        here, *there = self.simulator.run_many(thetas, locals_)
         m = here.shape[1] * here.shape[2]
-        sizes = self.sizes(theta)
 
-        def slope(there: np.ndarray, step: float) -> np.ndarray:
-            moved = (there - here) * (self.records.weights / step)
-            return self.noise.whiten(moved).reshape(len(here), m)
+        def slope(moved: np.ndarray, step: float) -> np.ndarray:
+            change = (moved - here) * (self.records.weights / step)
+            return self.noise.whiten(change).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
-        for i in np.flatnonzero(which):
-            step = DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= structure.high[i] else -1)
-            moved = theta.copy()
-            moved[i] += step
-            of_theta[i] = slope(self.simulator.run(moved, local), step)
+        for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):
+            of_theta[i] = slope(moved, step)
         of_local = np.zeros((structure.n_local, len(here), m))
-        states = None
-        for i in range(structure.n_local):
-            moved = local.copy()
-            if i < structure.order:
-                step = DIFFERENCE * self._spread[0] * (structure.dt**-i if not structure.cascade else 1.0)
+        for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
+            of_local[i] = slope(moved, step)
+        if structure.local:
+            states = self.simulator.states(theta[None], local[None, :, : structure.order])[0]
+            for i, term in enumerate(structure.local, start=structure.order):
+                step = self._spread[term.channel] / self.records.duration
+                moved = local.copy()
                 moved[:, i] += step
-                there = self.simulator.run(theta, moved)
-            else:
-                step = self._spread[structure.local[i - structure.order].channel] / self.records.duration
-                moved[:, i] += step
-                states = self.simulator.states(theta, local[:, : structure.order]) if states is None else states
-                there = self.simulator.outputs(theta, moved, states)
-            of_local[i] = slope(there, step)
+                of_local[i] = slope(self.simulator.outputs(theta, moved, states), step)
         return Slopes(of_theta, of_local)
 
     def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:

@@ -20,7 +20,9 @@ ON_GRID = 0.999
 def scenes_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> Scenes:
     """What the effects need to know to choose bounds and starts, for each input and each of the plant's outputs."""
     structure, records = estimate.structure, problem.records
-    states = problem.simulator.states(estimate.theta, estimate.local[:, : structure.order])[records.mask]  # [N, n]
+    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, : structure.order])[0][
+        records.mask
+    ]  # [N, n]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     place = float(np.max(np.abs(states[:, -1 if structure.cascade else 0])))
     rate = float(np.max(np.abs(states[:, min(1, structure.order - 1)])))

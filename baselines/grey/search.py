@@ -27,9 +27,21 @@ HELD_OUT = 3.0
 # The mean gain of the held-out blocks over its standard error: one in ten by chance.
 CONSISTENT = 1.3
 BLOCKS = 20
+# Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
+SMOOTH = 20.0
+# Share of the squared error that an effect must explain to be worth a name, however certain it is.
+MATTERS = 0.015
+MATTERS_AT_ALL = 0.003  # of what the plain model has
 # Log-likelihood ratio that confirms what the readings show already.
 OBVIOUS = 8.0
+# What a linear model of higher order would take up.
+LINEAR = ("constant_load", "input_delay", "actuator_lag", "sensor_lag")
+# By how much another choice of effects must be better to be preferred to the one that was found first.
+BETTER = 1.0
 MAX_TERMS = 5
+# The search uses so many samples, spread over the records; the final fit uses all.
+SEARCH_SAMPLES = 5000
+PIECE = 500
 MAX_ORDER = 4
 MAX_NOISE_ORDER = 3
 STARTS = 2
@@ -76,20 +88,22 @@ class Search:
     outputs: tuple[int, ...]
     structure: Structure
     plain: Estimate
+    cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
     threads: int = 2
     noise_order: int = 0
     path: list[Trial] = field(default_factory=list)
-    rounds: list[list[Trial]] = field(default_factory=list)
+    rounds: list[tuple[Trial, list[Trial]]] = field(default_factory=list)
 
     @classmethod
     def of(cls, train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]):
         """Fit the plain model of the outputs' kind."""
-        records = Records.of(train, outputs)
-        held_out = Records.of(valid, outputs) if valid else records
+        records = Records.of(excerpts(train), outputs)
+        held_out = Records.of(excerpts(valid), outputs) if valid else records
         structure, plain = choose_plain(records, held_out, channels, outputs)
         problem = Problem(structure, records, white(np.ones(structure.ny)))
         structure = replace(structure, scenes=scenes_of(plain, problem, channels, outputs))
-        return cls(records, held_out, channels, tuple(outputs), structure, replace(plain, structure=structure))
+        cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
+        return cls(records, held_out, channels, tuple(outputs), structure, replace(plain, structure=structure), cut)
 
     # ------------------------------------------------------------------ one model
 
@@ -97,6 +111,11 @@ class Search:
     def base_noise(self) -> Noise:
         """White noise as large as the errors of the plain model; weighs the outputs against each other."""
         return white(np.sqrt(np.mean(self.plain.errors[self.train.mask] ** 2, axis=0)) + 1e-300)
+
+    @cached_property
+    def plain_squares(self) -> float:
+        """The squares of the plain model, weighed as those of all others."""
+        return Problem(self.plain.structure, self.train, self.base_noise).squares(self.plain.errors)
 
     def assess(self, found: Estimate) -> Trial:
         """Score a fitted model on training and on held-out data."""
@@ -137,6 +156,8 @@ class Search:
             if name == "outliers" or (name == "coulomb_friction" and "stribeck_friction" in names):
                 continue
             channels = {"input": self.structure.nu, "force": 1, "output": self.structure.ny}[effect.port]
+            if name in LOCAL_POWERS and self.cut:
+                continue
             terms = [Term(effect, channel) for channel in range(channels)]
             found += [t for t in terms if t.key not in taken and effect.suits(self.structure.scenes.of(t))]
         return found
@@ -216,11 +237,11 @@ class Search:
             scored.append((gain, start))
         return scored
 
-    def round(self, here: Estimate, without: Sequence[tuple[str, int]] = ()) -> list[Trial]:
-        """Every candidate added to a model, refitted and assessed; the best first."""
+    def round(self, here: Estimate, names: Sequence[str] = ()) -> list[Trial]:
+        """Every candidate (of those named) added to a model, refitted and assessed; the best first."""
         problem = Problem(here.structure, self.train, self.base_noise)
         slopes = problem.slopes(here.theta, here.local, here.structure.free)
-        terms = [term for term in self.candidates(here.structure.terms) if term.key not in without]
+        terms = [t for t in self.candidates(here.structure.terms) if not names or t.effect.name in names]
 
         def attempt(term: Term) -> Estimate | None:
             return self.extend(here, term, slopes)
@@ -236,21 +257,54 @@ class Search:
     # ------------------------------------------------------------------ the whole search
 
     def run(self) -> Search:
-        """Forward steps while noise alone would not do as well, then exchange, then what is not needed out again."""
+        """What the readings show, what a linear model needs more, then everything; and out again what was in vain."""
         here = self.look(self.assess(self.plain))
+        here = self.grow(here, LINEAR)
+        here = self.grow(here)
+        here = self.prune(here)
+        self.path.append(self.exchange(here))
+        return self
+
+    def grow(self, here: Trial, names: Sequence[str] = ()) -> Trial:
+        """Add the best effect (of those named) while noise alone would not do as well."""
         while len(here.terms) < MAX_TERMS:
-            trials = self.round(here.estimate)
+            trials = self.round(here.estimate, names)
             if trials:
                 self._choose_noise_order(min(trials, key=lambda trial: trial.estimate.squares).estimate)
                 here, trials = self._again(here), sorted(map(self._again, trials), key=lambda trial: -trial.score)
-                self.path = [self._again(trial) for trial in self.path]
-            self.rounds.append(trials)
+            self.rounds.append((here, trials))
             better = [trial for trial in trials if self.significant(here, trial)]
             if not better:
                 break
             here = better[0]
             self.path.append(here)
-        return self
+        return here
+
+    def prune(self, here: Trial) -> Trial:
+        """Take out, one by one, the effects that the others have made superfluous."""
+        while len(here.terms) > 1:
+            rest = [self.without(here, term) for term in here.terms]
+            needless = [trial for trial in rest if not self.significant(trial, here)]
+            if not needless:
+                break
+            here = max(needless, key=lambda trial: trial.score)
+        return here
+
+    def without(self, here: Trial, term: Term) -> Trial:
+        """The model with one term less, fitted again."""
+        structure = self.structure.having([other for other in here.terms if other != term])
+        return self.assess(self.fit(structure.terms, [self.carry(here.estimate, structure, term, None)]))
+
+    def exchange(self, here: Trial) -> Trial:
+        """Try every other effect in the place of each, because the first choice was made without the others."""
+        for term in here.terms if len(here.terms) > 1 else ():
+            if term not in here.terms:
+                continue
+            rest = self.without(here, term)
+            trials = [trial for trial in self.round(rest.estimate) if self.significant(rest, trial)]
+            if trials and trials[0].score > here.score + BETTER:
+                here = self.prune(trials[0])
+        return here
 
     def look(self, here: Trial) -> Trial:
         """What the readings themselves show, before the errors of any model are asked."""
@@ -283,7 +337,9 @@ class Search:
         extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
         tried = len(self.candidates(smaller.terms)) * STARTS
         chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
-        return bool(chance < FALSE_NAMES and self.holds_out(smaller, larger))
+        gain = smaller.estimate.squares - larger.estimate.squares
+        matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * self.plain_squares
+        return bool(matters and chance < FALSE_NAMES and self.holds_out(smaller, larger))
 
     def holds_out(self, smaller: Trial, larger: Trial) -> bool:
         """Whether the larger model simulates held-out data better, in most of them."""
@@ -293,6 +349,16 @@ class Search:
             return larger.valid - smaller.valid - price > HELD_OUT
         gain = smaller.blocks - larger.blocks
         return bool(gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain)))
+
+
+def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> list[Experiment]:
+    """Pieces of the experiments, evenly spread, when they are longer than a search needs; else all of them."""
+    total = sum(map(len, experiments))
+    if total <= 1.5 * samples:
+        return list(experiments)
+    pieces = [x[a : a + PIECE] for x in experiments for a in range(0, max(1, len(x) - PIECE // 2), PIECE)]
+    wanted = max(2, samples * len(pieces) // sum(map(len, pieces)))
+    return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]
 
 
 def replaces(new: Term, old: Term) -> bool:
@@ -308,7 +374,7 @@ def choose_plain(
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
         structure = Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=len(outputs) == 2)
-        return structure, fit_plain(structure, train)
+        return _choose_hold(fit_plain(structure, train), train, valid)
     tried = []
     for order in range(1, MAX_ORDER + 1):
         for zeros in (0,) if kind == "level" else tuple(range(order)):
@@ -319,8 +385,28 @@ def choose_plain(
     for structure, fit, squares in tried:  # from the simplest on
         worse = squares - best[2]
         if worse.mean() <= worse.std() / math.sqrt(len(worse)):
-            return structure, fit
-    return best[:2]
+            return _choose_hold(fit, train, valid)
+    return _choose_hold(best[1], train, valid)
+
+
+def _choose_hold(held: Estimate, train: Records, valid: Records) -> tuple[Structure, Estimate]:
+    """Let the input run on smoothly between samples where that fits clearly better than holding it."""
+    simple = held.structure.cascade or held.structure.two_outputs
+    zeros = held.structure.zeros if simple else held.structure.order - 1
+    structure = replace(held.structure, smooth=True, zeros=zeros)
+    noise = white(np.sqrt(np.mean(held.errors[train.mask] ** 2, axis=0)) + 1e-300)
+    theta = np.zeros(structure.size)
+    before = held.structure
+    for part in (0, 2, 4):
+        theta[structure.at[part]] = held.theta[before.at[part]]
+    theta[structure.at[3]][: before.zeros] = held.theta[before.at[3]]
+    theta[structure.at[1]][:: len(structure.taps)] = held.theta[before.at[1]]
+    smooth = Problem(structure, train, noise).fit(theta, held.local)
+    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(held.errors, train.mask, 1)
+    clearly = gain > SMOOTH * before.nu
+    if clearly and _block_errors(smooth, valid).mean() < _block_errors(held, valid).mean():
+        return structure, smooth
+    return held.structure, held
 
 
 def _block_errors(fit: Estimate, valid: Records) -> np.ndarray:

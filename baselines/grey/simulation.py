@@ -28,6 +28,13 @@ def nothing(x, v, t, h, p, i, m, j):
     return 0.0
 
 
+def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
+    """u some steps later (or, negative, before), standing still outside the record."""
+    if steps > 0:
+        return np.concatenate((u[:, steps:], np.repeat(u[:, -1:], steps, axis=1)), axis=1)
+    return np.concatenate((np.repeat(u[:, :1], -steps, axis=1), u[:, :steps]), axis=1) if steps else u
+
+
 class Simulator:
     """One structure on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller."""
 
@@ -37,8 +44,9 @@ class Simulator:
         self.h = structure.dt / self.substeps
         self.t = structure.dt * np.arange(u.shape[1])  # [T]
         self.shape = u.shape
-        held = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)  # [nu, E, T * substeps]
-        self._u = np.ascontiguousarray(held)
+        # [nu, E, T * substeps]: each sample until the next one
+        arrived = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)
+        self._u = np.ascontiguousarray(arrived)
         self._arrived: dict[bytes, np.ndarray] = {}
         forces = structure.forces()
         if len(forces) > SLOTS:
@@ -50,21 +58,30 @@ class Simulator:
         self._p_at = np.array([structure.term_at(term).start for term in forces] + [0] * unused)
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory[:-1], *([0] * unused)])
-        self._memory = np.zeros(max(1, memory[-1]))
+        self._memory = np.zeros(max(1, int(memory[-1])))
 
-    def states(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E n"]) -> Float[np.ndarray, "E T n"]:
-        """The states of the plant at the samples, the first being the start."""
+    def states(
+        self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E n"]
+    ) -> Float[np.ndarray, "S E T n"]:
+        """The states of the plant at the samples, the first being the start, for each of several thetas."""
         structure, (experiments, samples, _) = self.structure, self.shape
-        n = structure.order
-        a = structure.matrix(theta)
-        e, g0, g1 = np.empty((3, n, n))
-        transition(a, self.h, e, g0, g1)
-        states = np.empty((experiments, samples, n))
+        n, s = structure.order, len(thetas)
+        e, g0, g1 = np.empty((3, s, n, n))
+        rates = np.empty((s, n))
+        for i, theta in enumerate(thetas):
+            # A parameter of an effect leaves the plant as it is.
+            if i and (theta[: structure.n_plant] == thetas[i - 1][: structure.n_plant]).all():
+                e[i], g0[i], g1[i], rates[i] = e[i - 1], g0[i - 1], g1[i - 1], rates[i - 1]
+                continue
+            a = structure.matrix(theta)
+            transition(a, self.h, e[i], g0[i], g1[i])
+            rates[i] = -np.diag(a)
+        states = np.empty((s, experiments, samples, n))
         entry, fast = (0, 0) if structure.cascade else (n - 1, min(1, n - 1))
         run_plant(
-            e, g0, g1, -np.diag(a).copy(), entry, fast, self.drive(theta), np.ascontiguousarray(start),
-            self.substeps, self.h, self._terms, self._n_terms, self._roles, theta, self._p_at, self._m_at,
-            self._memory, states,
+            e, g0, g1, rates, entry, fast, np.stack([self.drive(theta) for theta in thetas]),
+            np.ascontiguousarray(starts), self.substeps, self.h, self._terms, self._n_terms, self._roles,
+            np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
 
@@ -73,8 +90,10 @@ class Simulator:
         structure = self.structure
         gains, offset = theta[structure.at[1]], theta[structure.at[2]]
         total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
-        for channel, gain in enumerate(gains):
-            total += gain * self.arrived(theta, channel)
+        for channel, of_channel in enumerate(gains.reshape(structure.nu, -1)):
+            arrived = self.arrived(theta, channel)
+            for tap, gain in zip(structure.taps, of_channel, strict=True):
+                total += gain * shifted(arrived, tap * self.substeps)
         return total
 
     def arrived(self, theta: Float[np.ndarray, " p"], channel: int) -> Float[np.ndarray, "E K"]:
@@ -113,5 +132,12 @@ class Simulator:
 
     def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
         """Simulated outputs; local holds the start state and the local parameters of each experiment."""
+        return self.run_many(theta[None], local[None])[0]
+
+    def run_many(
+        self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
+    ) -> Float[np.ndarray, "S E T ny"]:
+        """The same for several parameter vectors, which saves the way into the compiled loop."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return self.outputs(theta, local, self.states(theta, local[:, : self.structure.order]))
+            states = self.states(thetas, locals_[:, :, : self.structure.order])
+            return np.stack([self.outputs(*these) for these in zip(thetas, locals_, states, strict=True)])

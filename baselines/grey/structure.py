@@ -66,6 +66,9 @@ class Structure:
     zeros: int = 0
     two_outputs: bool = False
     offset: bool = False
+    # Between samples the input is held (False), or runs on smoothly to the next one, as a filtered analogue one does:
+    # then its mean over the interval is a combination of the samples around it, with one gain each.
+    smooth: bool = False
     scenes: Scenes = None  # type: ignore[assignment]  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
 
@@ -73,6 +76,11 @@ class Structure:
     def ny(self) -> int:
         """Outputs."""
         return 1 + self.two_outputs
+
+    @property
+    def taps(self) -> tuple[int, ...]:
+        """Which samples act in the interval after sample 0. None later than its end, where the next output is read."""
+        return (0, 1, -1) if self.smooth else (0,)
 
     @property
     def cascade(self) -> bool:
@@ -87,7 +95,7 @@ class Structure:
     @cached_property
     def widths(self) -> tuple[int, ...]:
         """Sizes of the parts of theta."""
-        plant = (self.order, self.nu, int(self.offset), self.zeros, int(self.two_outputs))
+        plant = (self.order, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs))
         return plant + tuple(0 if t in self.local else len(self.parameters_of(t)) for t in self.terms)
 
     @cached_property
@@ -142,7 +150,7 @@ class Structure:
         """All of theta with bounds; those of the plant only as far as stability needs them."""
         inf = float("inf")
         plant = [Parameter(f"a{i}", "", 0.0, inf) for i in range(self.order)]
-        plant += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu)]
+        plant += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.widths[1])]
         plant += [Parameter("d", "", -inf, inf)] * self.offset
         plant += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
         plant += [Parameter("g", "", -inf, inf)] * self.two_outputs

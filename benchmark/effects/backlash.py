@@ -44,9 +44,9 @@ class Backlash(InputEffect):
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """Play of width p[0]; in the middle of the gap at the start."""
+        """Play of width p[0]; before the record the input came from zero."""
         half, arrived = 0.5 * p[0], np.empty_like(u)
-        held = u[:, 0]
+        held = np.zeros(len(u))
         low, high = u - half, u + half
         for k in range(u.shape[1]):
             held = np.minimum(np.maximum(held, low[:, k]), high[:, k])

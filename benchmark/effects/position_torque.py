@@ -35,7 +35,7 @@ class PositionTorque(ForceEffect):
         """Amplitude, length of one period, and phase at position zero."""
         return (
             Parameter("amplitude", scene.force_unit, -20 * scene.force, 20 * scene.force),
-            Parameter("period", scene.y_unit, 0.05 * scene.place, 8 * scene.place),
+            Parameter("period", scene.y_unit, 0.05 * scene.place, 2 * scene.place),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
@@ -43,7 +43,7 @@ class PositionTorque(ForceEffect):
         """Periods from a tenth of the travel to several times its length, each with two phases."""
         return [
             Start((0.1 * scene.force, length * scene.place, phase), amplitude=0)
-            for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.6, 3.0)
+            for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.5)
             for phase in (0.0, 1.57)
         ]
 
