@@ -1,0 +1,169 @@
+"""What a diagnosis found: plain records, which reports show and `--json` writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+Verdict = Literal["named", "nothing_found", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """An estimated parameter with its 95 % interval."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """One view of what the plain model gets wrong: the share of the squared error that the view explains."""
+
+    view: str
+    output: str
+    share: float
+    chance: float
+    text: str
+    at: tuple[float, ...]
+    error: tuple[float, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Separation:
+    """An effect that these data do not tell from the named one, and the experiment that would."""
+
+    effect: str
+    title: str
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How the squared error of training grows when one parameter is held at other values: 2 (log L_max - log L)."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    deviance: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A physical effect that the data ask for.
+
+    evidence: share of the plain model's squared error, in training, that the effect explains with those before it;
+    gain: share of the squared error on held-out data that is lost again when the effect alone is taken out.
+    """
+
+    effect: str
+    title: str
+    text: str
+    reference: str
+    channel: str  # the input or output it sits on; empty for a force
+    evidence: float
+    gain: float
+    log_likelihood_ratio: float
+    parameters: tuple[Value, ...]
+    per_experiment: bool = False
+    confounded_with: tuple[Separation, ...] = ()
+    shows_in: tuple[str, ...] = ()
+    profiles: tuple[Profile, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One test experiment: measured, and simulated before and after the causes were added. t in s."""
+
+    experiment: str
+    t: Float[np.ndarray, " N"]
+    u: Float[np.ndarray, "N nu"]
+    y: Float[np.ndarray, "N ny"]
+    before: Float[np.ndarray, "N ny"]
+    after: Float[np.ndarray, "N ny"]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Free-run RMSE on the test split per output; share is 1 - after/before over all outputs, with a 95 % interval."""
+
+    before: dict[str, float]
+    after: dict[str, float]
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A formula for the missing force from a sparse regression: an offer to look at, not a finding."""
+
+    output: str
+    formula: str
+    explained: float  # share of the squared error of the force, held out
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """The answer of `simgap.diagnose` about one data set."""
+
+    dataset: str
+    verdict: Verdict
+    baseline: dict[str, Any]  # order, rmse and fit_percent per output, and poles
+    wrong: tuple[Wrong, ...]
+    causes: tuple[Cause, ...]
+    runner_up: dict[str, Any] | None  # effect, title, gain, margin (log-likelihood)
+    gain: Gain
+    seconds: float
+    units: dict[str, str] = field(default_factory=dict)
+    inputs: tuple[tuple[str, str], ...] = ()  # names and units
+    kinds: dict[str, str] = field(default_factory=dict)
+    checks: tuple[str, ...] = ()  # what the data checks found, one sentence each
+    left: float = 0.0  # share of what remains after the causes that could still be predicted from the input
+    offers: tuple[Offer, ...] = ()
+    traces: tuple[Trace, ...] = ()
+    seed: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema 1 of `simgap diagnose --json`."""
+        return {
+            "schema": 1,
+            "dataset": self.dataset,
+            "verdict": self.verdict,
+            "baseline": self.baseline,
+            "wrong": [
+                {"view": w.view, "output": w.output, "share": w.share, "chance": w.chance, "text": w.text}
+                for w in self.wrong
+            ],
+            "causes": [
+                {
+                    "effect": c.effect,
+                    "title": c.title,
+                    "text": c.text,
+                    "channel": c.channel,
+                    "evidence": c.evidence,
+                    "gain": c.gain,
+                    "log_likelihood_ratio": c.log_likelihood_ratio,
+                    "parameters": [vars(p) for p in c.parameters],
+                    "per_experiment": c.per_experiment,
+                    "confounded_with": [s.effect for s in c.confounded_with],
+                    "separate_by": {s.effect: s.experiment for s in c.confounded_with},
+                }
+                for c in self.causes
+            ],
+            "runner_up": self.runner_up,
+            "gain": vars(self.gain),
+            "checks": list(self.checks),
+            "left": self.left,
+            "offers": [vars(offer) for offer in self.offers],
+            "seed": self.seed,
+            "seconds": self.seconds,
+        }
