@@ -283,7 +283,7 @@ class Search:
     def prune(self, here: Trial) -> Trial:
         """Take out, one by one, the effects that the others have made superfluous."""
         while len(here.terms) > 1:
-            rest = [self.without(here, term) for term in here.terms]
+            rest = [self.without(here, term) for term in here.terms if not term.effect.obvious]
             needless = [trial for trial in rest if not self.significant(trial, here)]
             if not needless:
                 break
@@ -298,7 +298,7 @@ class Search:
     def exchange(self, here: Trial) -> Trial:
         """Try every other effect in the place of each, because the first choice was made without the others."""
         for term in here.terms if len(here.terms) > 1 else ():
-            if term not in here.terms:
+            if term not in here.terms or term.effect.obvious:
                 continue
             rest = self.without(here, term)
             trials = [trial for trial in self.round(rest.estimate) if self.significant(rest, trial)]

@@ -1,0 +1,113 @@
+"""A fitted grey box of one plant: its start from measured samples, its simulation, its intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import t as student
+
+from simgap.baselines.grey.least_squares import Estimate, Problem, Records, _Normal
+from simgap.baselines.grey.noise import Noise
+from simgap.baselines.grey.simulation import Simulator
+from simgap.baselines.grey.structure import LOCAL_POWERS, Structure
+from simgap.records import Channels, Experiment
+
+BLOCKS = 40
+
+
+def groups(channels: Channels) -> list[tuple[int, ...]]:
+    """Which outputs belong to one plant: a position with its velocity, where there is one of each; else each alone."""
+    kinds = [channel.kind for channel in channels.outputs]
+    if kinds.count("position") == 1 and kinds.count("velocity") == 1:
+        pair = (kinds.index("position"), kinds.index("velocity"))
+        return [pair] + [(i,) for i in range(len(kinds)) if i not in pair]
+    return [(i,) for i in range(len(kinds))]
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """One plant with its effects, fitted; `noise` weighs its outputs against each other."""
+
+    estimate: Estimate
+    noise: Noise
+    outputs: tuple[int, ...]
+    records: Records
+
+    @classmethod
+    def fit(cls, start: Estimate, noise: Noise, experiments: Sequence[Experiment], outputs: tuple[int, ...]) -> Machine:
+        """Fit a model that was found on excerpts to all of the experiments."""
+        records = Records.of(experiments, outputs)
+        problem = Problem(start.structure, records, noise)
+        first = problem.fit(start.theta, fixed=np.ones(len(start.theta), dtype=bool))
+        return cls(problem.fit(start.theta, first.local), noise, outputs, records)
+
+    @property
+    def forecasting(self) -> Structure:
+        """The structure without what belongs to single experiments and cannot be forecast."""
+        structure = self.estimate.structure
+        return structure.having([term for term in structure.terms if term not in structure.local])
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Rows n .. T-1, from the start that suits the n measured samples best."""
+        structure, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
+        start = self.start(structure, u[:, :n], y_init)
+        return Simulator(structure, u).run(theta, start)[:, n:]
+
+    def start(self, structure: Structure, u: np.ndarray, y: np.ndarray) -> Float[np.ndarray, "B q"]:
+        """Local numbers at the first of the measured samples, by least squares on all of them."""
+        records = Records(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), structure.dt)
+        problem = Problem(structure, records, self.noise)
+        theta, fixed = self.estimate.theta, np.ones(len(self.estimate.theta), dtype=bool)
+        guess = problem.first_guess(theta)
+        signs = (1, -1) if any(term.effect.name == "absolute_sensor" for term in structure.terms) else (1,)
+        tried = [problem.fit(theta, sign * guess, fixed=fixed, max_steps=15) for sign in signs]
+        squares = np.stack([np.sum(self.noise.whiten(fit.errors) ** 2, axis=(1, 2)) for fit in tried])  # [try, B]
+        best = np.argmin(squares, axis=0)
+        return np.stack([fit.local for fit in tried])[best, np.arange(len(y))]
+
+    def again(self, experiments: Sequence[Experiment], n_init: int) -> list[Float[np.ndarray, "N ny"]]:
+        """Free runs in which the numbers of single experiments are estimated anew; rows n_init .. T-1.
+
+        The start comes from the first n_init samples as in `simulate`; bias and drift from the whole record.
+        """
+        simulated = []
+        for experiment in experiments:
+            y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init, list(self.outputs)])[0]
+            error = experiment.y[n_init:, list(self.outputs)] - y_hat
+            t = experiment.dt * np.arange(n_init, len(experiment))
+            for j in range(len(self.outputs)):
+                powers = sorted(LOCAL_POWERS[term.effect.name] for term in self.estimate.structure.local if term.channel == j)
+                if powers:
+                    columns = np.stack([t**power for power in powers], axis=1)  # [N, powers]
+                    y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
+            simulated.append(y_hat)
+        return simulated
+
+    def intervals(self) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+        """95 % intervals of theta, honest for coloured errors and for what the model cannot explain.
+
+        cov = H^-1 (sum over blocks of g g') H^-1, g = J' e of a block (Liang and Zeger 1986); Student's t.
+        """
+        structure, theta = self.estimate.structure, self.estimate.theta
+        problem = Problem(structure, self.records, self.noise)
+        slopes = problem.slopes(theta, self.estimate.local, structure.free)
+        white = self.noise.whiten(self.estimate.errors).reshape(len(self.estimate.local), -1)  # [E, M]
+        normal = _Normal.of(slopes, white)
+        h, weights, _ = normal._reduced(0.0)
+        # The slopes of theta when the local numbers follow: J - K (K'K)^-1 K'J.
+        own = slopes.theta - np.einsum("eqp,qem->pem", weights, slopes.local)
+        per_record = max(1, -(-BLOCKS // len(white)))
+        parts = np.array_split(own * white, per_record, axis=2)
+        g = np.concatenate([part.sum(axis=2).T for part in parts])  # [blocks, p]
+        inside = structure.free & (np.diag(normal.h) > 0)
+        inverse = np.linalg.pinv(h[np.ix_(inside, inside)], rcond=1e-12, hermitian=True)
+        used = len(g) / max(1, len(g) - 1)
+        covariance = inverse @ (g.T @ g)[np.ix_(inside, inside)] @ inverse * used
+        reach = np.full(len(theta), 0.0)
+        reach[inside] = student.ppf(0.975, max(2, len(g) - 1)) * np.sqrt(np.maximum(np.diag(covariance), 0))
+        return np.maximum(theta - reach, structure.low), np.minimum(theta + reach, structure.high)

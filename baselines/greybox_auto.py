@@ -1,0 +1,32 @@
+"""A grey box that finds its own effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from simgap.baselines.grey.machine import Machine, groups
+from simgap.baselines.grey.search import Search
+from simgap.baselines.greybox import GreyBox
+from simgap.records import TrainingSet
+from simgap.registry import MODELS
+
+
+@MODELS.register("greybox-auto")
+@dataclass
+class GreyBoxAuto(GreyBox):
+    """The grey box with those effects of the catalogue that training and validation data ask for.
+
+    What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other.
+    """
+
+    effects: tuple[()] = field(default=(), init=False, repr=False)
+    searches: list[Search] = field(default_factory=list, init=False, repr=False)
+
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        """Search on excerpts of the training data, then fit what was found to all of it; nothing here is random."""
+        plants = groups(data.channels)
+        self.searches = [Search.of(data.train, data.valid, data.channels, outputs).run() for outputs in plants]
+        self.machines = [
+            Machine.fit(search.path[-1].estimate, search.base_noise, data.train + data.valid, search.outputs)
+            for search in self.searches
+        ]
