@@ -81,7 +81,9 @@ class Machine:
             error = experiment.y[n_init:, list(self.outputs)] - y_hat
             t = experiment.dt * np.arange(n_init, len(experiment))
             for j in range(len(self.outputs)):
-                powers = sorted(LOCAL_POWERS[term.effect.name] for term in self.estimate.structure.local if term.channel == j)
+                powers = sorted(
+                    LOCAL_POWERS[term.effect.name] for term in self.estimate.structure.local if term.channel == j
+                )
                 if powers:
                     columns = np.stack([t**power for power in powers], axis=1)  # [N, powers]
                     y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]

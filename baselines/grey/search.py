@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.stats import chi2
@@ -19,6 +20,9 @@ from simgap.baselines.grey.structure import LOCAL_POWERS, Structure, Term
 from simgap.effects.effect import Start
 from simgap.records import Channels, Experiment
 from simgap.registry import EFFECTS
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 # The chance, over the whole catalogue, that noise alone passes for an effect.
 FALSE_NAMES = 1e-3
@@ -38,7 +42,13 @@ OBVIOUS = 8.0
 LINEAR = ("constant_load", "input_delay", "actuator_lag", "sensor_lag")
 # By how much another choice of effects must be better to be preferred to the one that was found first.
 BETTER = 1.0
+# Two models whose squared errors differ by less fit alike; then the simpler one is taken.
+ALIKE = 0.005
 MAX_TERMS = 5
+# Steps of a search until the candidates of a round are compared, and for those that are then left.
+FEW_STEPS = 6
+MAX_STEPS = 40
+FINALISTS = 8
 # The search uses so many samples, spread over the records; the final fit uses all.
 SEARCH_SAMPLES = 5000
 PIECE = 500
@@ -137,12 +147,21 @@ class Search:
         return np.concatenate([block.sum(axis=(1, 2)) for block in np.array_split(white**2, per_record, axis=1)])
 
     def fit(
-        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], noise: Noise | None = None
+        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], max_steps: int = MAX_STEPS
     ) -> Estimate:
         """The best fit of a set of terms from several starts."""
-        structure = self.structure.having(terms)
-        problem = Problem(structure, self.train, noise or self.base_noise)
-        return min((problem.fit(*start) for start in starts), key=lambda fit: fit.squares)
+        problem = Problem(self.structure.having(terms), self.train, self.base_noise)
+        return min((problem.fit(*start, max_steps=max_steps) for start in starts), key=lambda fit: fit.squares)
+
+    def add(self, here: Estimate, term: Term) -> Estimate:
+        """The model with one term more, whatever the score test says of it."""
+        problem = Problem(here.structure, self.train, self.base_noise)
+        slopes = problem.slopes(here.theta, here.local, here.structure.free)
+        found = self.extend(here, term, slopes)
+        if found is not None:
+            return found
+        structure = self.structure.having([*here.structure.terms, term])
+        return self.fit(structure.terms, [self.carry(here, structure, term, s) for s in structure.starts_of(term)])
 
     # ------------------------------------------------------------------ one round
 
@@ -162,7 +181,7 @@ class Search:
             found += [t for t in terms if t.key not in taken and effect.suits(self.structure.scenes.of(t))]
         return found
 
-    def extend(self, here: Estimate, term: Term, slopes: Slopes) -> Estimate | None:
+    def extend(self, here: Estimate, term: Term, slopes: Slopes, max_steps: int = MAX_STEPS) -> Estimate | None:
         """The model with one term more, fitted from the starts that the score test likes best; None if none does."""
         terms = [t for t in here.structure.terms if not replaces(term, t)]
         structure = self.structure.having([*terms, term])
@@ -177,7 +196,7 @@ class Search:
         if scored[0][0] < WORTH_A_REFIT:
             return None
         starts = [self.carry(here, structure, term, start) for _, start in scored[:STARTS]]
-        return self.fit(structure.terms, starts)
+        return self.fit(structure.terms, starts, max_steps)
 
     def carry(
         self, here: Estimate, structure: Structure, term: Term, start: Start | None
@@ -244,15 +263,36 @@ class Search:
         terms = [t for t in self.candidates(here.structure.terms) if not names or t.effect.name in names]
 
         def attempt(term: Term) -> Estimate | None:
-            return self.extend(here, term, slopes)
+            return self.extend(here, term, slopes, FEW_STEPS)
 
-        if self.threads > 1:
-            with ThreadPoolExecutor(self.threads) as pool:
-                fits = list(pool.map(attempt, terms))
-        else:
-            fits = [attempt(term) for term in terms]
-        found = [fit for fit in fits if fit is not None]
-        return sorted((self.assess(fit) for fit in found), key=lambda trial: -trial.score)
+        def finish(fit: Estimate) -> Trial:
+            return self.assess(fit if fit.converged else self.fit(fit.structure.terms, [(fit.theta, fit.local)]))
+
+        begun = sorted((fit for fit in self._map(attempt, terms) if fit is not None), key=self._cost)
+        return self._rank(self._map(finish, begun[:FINALISTS]))
+
+    def _map(self, work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        if self.threads < 2:
+            return list(map(work, items))
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(work, items))
+
+    def _cost(self, fit: Estimate) -> float:
+        """Squares and the number of parameters on one scale, for candidates of one round."""
+        n = self.train.samples * self.structure.ny
+        price = int(fit.structure.free.sum()) + len(fit.local) * len(fit.structure.local)
+        return 0.5 * n * math.log(fit.squares) + 0.5 * price * math.log(n)
+
+    def _rank(self, trials: list[Trial]) -> list[Trial]:
+        """The best first; but of those that fit alike, the one with the fewest parameters."""
+        ranked = sorted(trials, key=lambda trial: -trial.score)
+        if not ranked:
+            return ranked
+        alike = [t for t in ranked if t.estimate.squares < (1 + ALIKE) * ranked[0].estimate.squares]
+        simplest = min(alike, key=lambda trial: trial.k + trial.k_train)
+        if simplest.k + simplest.k_train == ranked[0].k + ranked[0].k_train:
+            return ranked
+        return [simplest, *(trial for trial in ranked if trial is not simplest)]
 
     # ------------------------------------------------------------------ the whole search
 
@@ -271,7 +311,7 @@ class Search:
             trials = self.round(here.estimate, names)
             if trials:
                 self._choose_noise_order(min(trials, key=lambda trial: trial.estimate.squares).estimate)
-                here, trials = self._again(here), sorted(map(self._again, trials), key=lambda trial: -trial.score)
+                here, trials = self._again(here), self._rank([self._again(trial) for trial in trials])
             self.rounds.append((here, trials))
             better = [trial for trial in trials if self.significant(here, trial)]
             if not better:
@@ -318,6 +358,11 @@ class Search:
                     here = trial
                     self.path.append(here)
         return here
+
+    def losses(self, here: Trial) -> list[tuple[Term, Trial]]:
+        """Every effect of a model with the model that does without it, the most missed first."""
+        rest = [(term, self.without(here, term)) for term in here.terms]
+        return sorted(rest, key=lambda pair: -pair[1].estimate.squares)
 
     def _again(self, trial: Trial) -> Trial:
         return self.assess(trial.estimate)
@@ -390,23 +435,29 @@ def choose_plain(
 
 
 def _choose_hold(held: Estimate, train: Records, valid: Records) -> tuple[Structure, Estimate]:
-    """Let the input run on smoothly between samples where that fits clearly better than holding it."""
-    simple = held.structure.cascade or held.structure.two_outputs
-    zeros = held.structure.zeros if simple else held.structure.order - 1
-    structure = replace(held.structure, smooth=True, zeros=zeros)
+    """Let the input run on smoothly between samples where the next sample is clearly felt before it is read.
+
+    The sample before it may act along in both models, so that a delay or a lag does not pass for a smooth input.
+    """
     noise = white(np.sqrt(np.mean(held.errors[train.mask] ** 2, axis=0)) + 1e-300)
-    theta = np.zeros(structure.size)
+    delayed, smooth = (_with_taps(held, train, noise, taps) for taps in ((0, -1), (0, -1, 1)))
+    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(delayed.errors, train.mask, 1)
+    clearly = gain > SMOOTH * held.structure.nu
+    if clearly and _block_errors(smooth, valid).mean() < _block_errors(delayed, valid).mean():
+        return smooth.structure, smooth
+    return held.structure, held
+
+
+def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ...]) -> Estimate:
     before = held.structure
+    simple = before.cascade or before.two_outputs
+    structure = replace(before, taps=taps, zeros=before.zeros if simple else before.order - 1)
+    theta = np.zeros(structure.size)
     for part in (0, 2, 4):
         theta[structure.at[part]] = held.theta[before.at[part]]
     theta[structure.at[3]][: before.zeros] = held.theta[before.at[3]]
-    theta[structure.at[1]][:: len(structure.taps)] = held.theta[before.at[1]]
-    smooth = Problem(structure, train, noise).fit(theta, held.local)
-    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(held.errors, train.mask, 1)
-    clearly = gain > SMOOTH * before.nu
-    if clearly and _block_errors(smooth, valid).mean() < _block_errors(held, valid).mean():
-        return structure, smooth
-    return held.structure, held
+    theta[structure.at[1]][:: len(taps)] = held.theta[before.at[1]]
+    return Problem(structure, train, noise).fit(theta, held.local)
 
 
 def _block_errors(fit: Estimate, valid: Records) -> np.ndarray:

@@ -66,9 +66,10 @@ class Structure:
     zeros: int = 0
     two_outputs: bool = False
     offset: bool = False
-    # Between samples the input is held (False), or runs on smoothly to the next one, as a filtered analogue one does:
-    # then its mean over the interval is a combination of the samples around it, with one gain each.
-    smooth: bool = False
+    # Which samples of the input act in the interval after sample 0, with one gain each. An input that is held needs
+    # just that one; the mean of one that runs on smoothly to the next sample is a combination of those around it.
+    # None comes later than the end of the interval, where the next output is read.
+    taps: tuple[int, ...] = (0,)
     scenes: Scenes = None  # type: ignore[assignment]  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
 
@@ -76,11 +77,6 @@ class Structure:
     def ny(self) -> int:
         """Outputs."""
         return 1 + self.two_outputs
-
-    @property
-    def taps(self) -> tuple[int, ...]:
-        """Which samples act in the interval after sample 0. None later than its end, where the next output is read."""
-        return (0, 1, -1) if self.smooth else (0,)
 
     @property
     def cascade(self) -> bool:
