@@ -82,7 +82,9 @@ def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes:
     else:
         fold += (np.arange(mask.shape[1]) * FOLDS // mask.shape[1])[None]
     fold, e = fold[mask], found.errors[..., 0][mask]
-    of_theta = np.moveaxis(slopes.theta[found.structure.free], 0, 2).reshape(*mask.shape, found.structure.ny, -1)[:, :, 0]
+    of_theta = np.moveaxis(slopes.theta[found.structure.free], 0, 2).reshape(*mask.shape, found.structure.ny, -1)[
+        :, :, 0
+    ]
     model = of_theta[mask]  # what the model's own parameters would do
     features = np.concatenate((model, responses[mask]), axis=1)
     features = features / (np.sqrt(np.mean(features**2, axis=0)) + 1e-300)

@@ -41,7 +41,11 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
     gains = np.zeros(structure.size, dtype=bool)
     gains[structure.at[1]] = gains[structure.at[2]] = True
     tried = []
-    for shape in poles(structure, records, coarse=True):
+    few = structure.order <= 2
+    shapes = list(poles(structure, records, coarse=True)) if few else [
+        [a * scale for a in starts[0][structure.at[0]]] for scale in (0.25, 0.5, 1.0, 2.0)
+    ]  # fmt: skip
+    for shape in shapes:
         for start in starts:
             theta = start.copy()
             theta[structure.at[0]] = shape

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from simgap.baselines.grey.least_squares import Estimate, Problem, Records, Slopes, _Normal
-from simgap.baselines.grey.noise import Noise, estimate, log_likelihood, white
+from simgap.baselines.grey.noise import Noise, log_likelihood, white
 from simgap.baselines.grey.plain import fit_plain, refit_from_poles
 from simgap.baselines.grey.scenes import scenes_of
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure, Term
 from simgap.effects.effect import Start
-from simgap.records import Channels, Experiment
+from simgap.records import Channels, Experiment, Kind
 from simgap.registry import EFFECTS
 
 T = TypeVar("T")
@@ -33,6 +33,7 @@ CONSISTENT = 1.3
 BLOCKS = 20
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
 SMOOTH = 20.0
+EARLY = 0.25  # samples
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
 MATTERS_AT_ALL = 0.003  # of what the plain model has
@@ -105,15 +106,34 @@ class Search:
     rounds: list[tuple[Trial, list[Trial]]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]):
+    def of(
+        cls, train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]
+    ) -> Search:
         """Fit the plain model of the outputs' kind."""
         records = Records.of(excerpts(train), outputs)
         held_out = Records.of(excerpts(valid), outputs) if valid else records
-        structure, plain = choose_plain(records, held_out, channels, outputs)
-        problem = Problem(structure, records, white(np.ones(structure.ny)))
-        structure = replace(structure, scenes=scenes_of(plain, problem, channels, outputs))
         cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
-        return cls(records, held_out, channels, tuple(outputs), structure, replace(plain, structure=structure), cut)
+
+        def started(plain: Estimate) -> Search:
+            problem = Problem(plain.structure, records, white(np.ones(plain.structure.ny)))
+            structure = replace(plain.structure, scenes=scenes_of(plain, problem, channels, outputs))
+            plain = replace(plain, structure=structure)
+            return cls(records, held_out, channels, tuple(outputs), structure, plain, cut)
+
+        tried = plain_models(records, held_out, channels.outputs[outputs[0]].kind)
+        search = started(tried[-1])
+        for simpler in tried[:-1]:
+            # A higher order is no answer where a delay, which costs no more, does as well.
+            other = started(simpler)
+            if other.held_out_error(other.add(other.plain, DELAY)) <= search.held_out_error(search.plain):
+                search = other
+                break
+        smooth = let_run_on(search.plain, records, held_out)
+        return search if smooth is None else started(smooth)
+
+    def held_out_error(self, fit: Estimate) -> float:
+        """Mean square of held-out simulations."""
+        return float(block_errors(fit, self.valid).mean())
 
     # ------------------------------------------------------------------ one model
 
@@ -406,46 +426,54 @@ def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -
     return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]
 
 
+DELAY = Term(EFFECTS["input_delay"]())
+
+
 def replaces(new: Term, old: Term) -> bool:
     """Stribeck friction contains Coulomb friction."""
     return new.effect.name == "stribeck_friction" and old.effect.name == "coulomb_friction"
 
 
-def choose_plain(
-    train: Records, valid: Records, channels: Channels, outputs: Sequence[int]
-) -> tuple[Structure, Estimate]:
-    """The plain linear model: order 1 for a velocity, 2 for a position, else what held-out data ask for up to 4."""
-    kind = channels.outputs[outputs[0]].kind
+def plain_models(train: Records, valid: Records, kind: Kind) -> list[Estimate]:
+    """Plain linear models: of order 1 for a velocity, 2 for a position, else the orders up to what held-out data ask for.
+
+    The last one is the simplest whose held-out error is within a standard error of the best.
+    """
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
-        structure = Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=len(outputs) == 2)
-        return _choose_hold(fit_plain(structure, train), train, valid)
+        return [
+            fit_plain(Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2), train)
+        ]
     tried = []
     for order in range(1, MAX_ORDER + 1):
         for zeros in (0,) if kind == "level" else tuple(range(order)):
-            structure = Structure(kind, order, nu, dt, zeros=zeros, offset=True)
-            fit = fit_plain(structure, train)
-            tried.append((structure, fit, _block_errors(fit, valid)))
-    best = min(tried, key=lambda trial: trial[2].mean())
-    for structure, fit, squares in tried:  # from the simplest on
-        worse = squares - best[2]
+            fit = fit_plain(Structure(kind, order, nu, dt, zeros=zeros, offset=True), train)
+            tried.append((fit, block_errors(fit, valid)))
+    best = min((squares for _, squares in tried), key=np.mean)
+    chosen = []
+    for fit, squares in tried:  # from the simplest on
+        chosen.append(fit)
+        worse = squares - best
         if worse.mean() <= worse.std() / math.sqrt(len(worse)):
-            return _choose_hold(fit, train, valid)
-    return _choose_hold(best[1], train, valid)
+            break
+    return chosen
 
 
-def _choose_hold(held: Estimate, train: Records, valid: Records) -> tuple[Structure, Estimate]:
-    """Let the input run on smoothly between samples where the next sample is clearly felt before it is read.
+def let_run_on(held: Estimate, train: Records, valid: Records) -> Estimate | None:
+    """The model with an input that runs on smoothly between samples, where it is felt clearly before it is held.
 
-    The sample before it may act along in both models, so that a delay or a lag does not pass for a smooth input.
+    Seen from held samples, such an input comes half a sample early: the mean time of its gains, zeros included,
+    says so. A lag or a delay would make it late.
     """
     noise = white(np.sqrt(np.mean(held.errors[train.mask] ** 2, axis=0)) + 1e-300)
-    delayed, smooth = (_with_taps(held, train, noise, taps) for taps in ((0, -1), (0, -1, 1)))
-    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(delayed.errors, train.mask, 1)
-    clearly = gain > SMOOTH * held.structure.nu
-    if clearly and _block_errors(smooth, valid).mean() < _block_errors(delayed, valid).mean():
-        return smooth.structure, smooth
-    return held.structure, held
+    smooth = _with_taps(held, train, noise, (0, -1, 1))
+    structure, theta = smooth.structure, smooth.theta
+    gains = theta[structure.at[1]].reshape(structure.nu, -1)
+    early = float(np.sum(gains @ structure.taps * gains.sum(1)) / max(np.sum(gains.sum(1) ** 2), 1e-300))
+    early += float(np.sum(theta[structure.at[3]][:1]) - np.sum(held.theta[held.structure.at[3]][:1])) / structure.dt
+    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(held.errors, train.mask, 1)
+    better = block_errors(smooth, valid).mean() < block_errors(held, valid).mean()
+    return smooth if early > EARLY and gain > SMOOTH * structure.nu and better else None
 
 
 def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ...]) -> Estimate:
@@ -460,7 +488,7 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
     return Problem(structure, train, noise).fit(theta, held.local)
 
 
-def _block_errors(fit: Estimate, valid: Records) -> np.ndarray:
+def block_errors(fit: Estimate, valid: Records) -> np.ndarray:
     """Mean squares of held-out free runs, in about twenty blocks."""
     fixed = np.ones(fit.structure.size, dtype=bool)
     errors = Problem(fit.structure, valid, white(np.ones(1))).fit(fit.theta, fixed=fixed, max_steps=10).errors

@@ -145,7 +145,8 @@ class Structure:
     def parameters(self) -> tuple[Parameter, ...]:
         """All of theta with bounds; those of the plant only as far as stability needs them."""
         inf = float("inf")
-        plant = [Parameter(f"a{i}", "", 0.0, inf) for i in range(self.order)]
+        # A tank that is much faster than the sampling is no tank.
+        plant = [Parameter(f"a{i}", "", 0.0, 5 / self.dt if self.cascade else inf) for i in range(self.order)]
         plant += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.widths[1])]
         plant += [Parameter("d", "", -inf, inf)] * self.offset
         plant += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
