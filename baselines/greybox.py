@@ -12,7 +12,7 @@ from jaxtyping import Float
 from simgap.baselines.grey.machine import Machine, groups
 from simgap.baselines.grey.search import Search
 from simgap.baselines.grey.structure import Term
-from simgap.records import TrainingSet, UnusableInput
+from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS
 
 
@@ -39,7 +39,7 @@ class GreyBox:
             for effect, plant, channel in placed:
                 if plant is None or plant == outputs:
                     found = search.add(found, Term(effect, channel))
-            self.machines.append(Machine.fit(found, search.base_noise, data.train + data.valid, outputs))
+            self.machines.append(Machine.fit(found, search, data.train + data.valid))
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -49,6 +49,13 @@ class GreyBox:
         for machine in self.machines:
             outputs = list(machine.outputs)
             y_hat[:, :, outputs] = machine.simulate(u, y_init[:, :, outputs])
+        return y_hat
+
+    def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+        """A free run of one experiment, with the parameters that belong to it alone estimated from it."""
+        y_hat = np.empty((len(experiment) - n_init, experiment.y.shape[1]))
+        for machine in self.machines:
+            y_hat[:, list(machine.outputs)] = machine.again(experiment, n_init)
         return y_hat
 
     @property

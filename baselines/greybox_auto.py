@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from simgap.baselines.grey.machine import Machine, groups
+from simgap.baselines.grey.part import Part
 from simgap.baselines.grey.search import Search
 from simgap.baselines.greybox import GreyBox
 from simgap.records import TrainingSet
@@ -27,6 +28,18 @@ class GreyBoxAuto(GreyBox):
         plants = groups(data.channels)
         self.searches = [Search.of(data.train, data.valid, data.channels, outputs).run() for outputs in plants]
         self.machines = [
-            Machine.fit(search.path[-1].estimate, search.base_noise, data.train + data.valid, search.outputs)
-            for search in self.searches
+            Machine.fit(search.path[-1].estimate, search, data.train + data.valid) for search in self.searches
         ]
+
+    def plain(self) -> GreyBox:
+        """The plain linear model that gains are counted from."""
+        model = GreyBox()
+        model.machines = [
+            Machine.fit(search.plain, search, machine.experiments)
+            for search, machine in zip(self.searches, self.machines, strict=True)
+        ]
+        return model
+
+    def parts(self) -> list[Part]:
+        """What was found out about each plant."""
+        return [Part(*pair) for pair in zip(self.searches, self.machines, strict=True)]

@@ -6,11 +6,12 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from simgap.diagnosis.diagnose import diagnose
     from simgap.data import Missing, describe, fetch, load, save
     from simgap.fitting import Fit, fit
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
-    from simgap.registry import DATASETS, MODELS
+    from simgap.registry import DATASETS, EFFECTS, MODELS
     from simgap.reports.leaderboard import report
     from simgap.runner import Progress, run
     from simgap.suites import Suite, load_suite
@@ -19,12 +20,13 @@ __version__ = "0.1.0"
 
 _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
+    "simgap.diagnosis.diagnose": ("diagnose",),
     "simgap.fitting": ("Fit", "fit"),
     "simgap.protocol": ("Model",),
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
     ),
-    "simgap.registry": ("DATASETS", "MODELS"),
+    "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
     "simgap.reports.leaderboard": ("report",),
     "simgap.runner": ("Progress", "run"),
     "simgap.suites": ("Suite", "load_suite"),
@@ -32,8 +34,8 @@ _HOME = {
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
-    "DATASETS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
-    "Progress", "Result", "Suite", "TrainingSet", "UnusableInput", "describe", "fetch", "fit", "load",
+    "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
+    "Progress", "Result", "Suite", "TrainingSet", "UnusableInput", "describe", "diagnose", "fetch", "fit", "load",
     "load_suite", "report", "run", "save",
 ]  # fmt: skip
 

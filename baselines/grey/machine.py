@@ -11,6 +11,8 @@ from scipy.stats import t as student
 
 from simgap.baselines.grey.least_squares import Estimate, Problem, Records, _Normal
 from simgap.baselines.grey.noise import Noise
+from simgap.baselines.grey.outliers import Outliers, flag, left_out
+from simgap.baselines.grey.search import Search
 from simgap.baselines.grey.simulation import Simulator
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure
 from simgap.records import Channels, Experiment
@@ -35,14 +37,21 @@ class Machine:
     noise: Noise
     outputs: tuple[int, ...]
     records: Records
+    experiments: tuple[Experiment, ...]
+    outliers: tuple[Outliers, ...] = ()
 
     @classmethod
-    def fit(cls, start: Estimate, noise: Noise, experiments: Sequence[Experiment], outputs: tuple[int, ...]) -> Machine:
-        """Fit a model that was found on excerpts to all of the experiments."""
-        records = Records.of(experiments, outputs)
+    def fit(cls, start: Estimate, search: Search, experiments: Sequence[Experiment]) -> Machine:
+        """Fit a model that a search found on excerpts to all of the experiments."""
+        records, noise, outputs = Records.of(experiments, search.outputs), search.base_noise, search.outputs
+        fixed = np.ones(len(start.theta), dtype=bool)
+        first = Problem(start.structure, records, noise).fit(start.theta, fixed=fixed)
+        if search.outliers:
+            records = left_out(records, first.errors, search.outliers)
         problem = Problem(start.structure, records, noise)
-        first = problem.fit(start.theta, fixed=np.ones(len(start.theta), dtype=bool))
-        return cls(problem.fit(start.theta, first.local), noise, outputs, records)
+        return cls(
+            problem.fit(start.theta, first.local), noise, outputs, records, tuple(experiments), tuple(search.outliers)
+        )
 
     @property
     def forecasting(self) -> Structure:
@@ -70,25 +79,23 @@ class Machine:
         best = np.argmin(squares, axis=0)
         return np.stack([fit.local for fit in tried])[best, np.arange(len(y))]
 
-    def again(self, experiments: Sequence[Experiment], n_init: int) -> list[Float[np.ndarray, "N ny"]]:
-        """Free runs in which the numbers of single experiments are estimated anew; rows n_init .. T-1.
-
-        The start comes from the first n_init samples as in `simulate`; bias and drift from the whole record.
-        """
-        simulated = []
-        for experiment in experiments:
-            y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init, list(self.outputs)])[0]
-            error = experiment.y[n_init:, list(self.outputs)] - y_hat
-            t = experiment.dt * np.arange(n_init, len(experiment))
-            for j in range(len(self.outputs)):
-                powers = sorted(
-                    LOCAL_POWERS[term.effect.name] for term in self.estimate.structure.local if term.channel == j
-                )
-                if powers:
-                    columns = np.stack([t**power for power in powers], axis=1)  # [N, powers]
-                    y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
-            simulated.append(y_hat)
-        return simulated
+    def again(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+        """Rows n_init .. T-1 of a free run in which what belongs to this experiment is estimated from all of it."""
+        structure, outputs = self.estimate.structure, list(self.outputs)
+        y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init][:, :, outputs])[0]
+        error = experiment.y[n_init:, outputs] - y_hat
+        t = experiment.dt * np.arange(n_init, len(experiment))
+        for j in range(len(outputs)):
+            powers = sorted(LOCAL_POWERS[term.effect.name] for term in structure.local if term.channel == j)
+            if powers:
+                columns = np.stack([t**power for power in powers], axis=1)  # [N, powers]
+                y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
+        if self.outliers:
+            error = experiment.y[n_init:, outputs] - y_hat
+            flags = flag(error[None], np.ones((1, len(error)), dtype=bool))[0]
+            for j in (found.output for found in self.outliers):
+                y_hat[flags[:, j], j] += error[flags[:, j], j]
+        return y_hat
 
     def intervals(self) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
         """95 % intervals of theta, honest for coloured errors and for what the model cannot explain.

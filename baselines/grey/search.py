@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.stats import chi2
 
 from simgap.baselines.grey.least_squares import Estimate, Problem, Records, Slopes, _Normal
 from simgap.baselines.grey.noise import Noise, log_likelihood, white
+from simgap.baselines.grey.outliers import Outliers, find, left_out
 from simgap.baselines.grey.plain import fit_plain, refit_from_poles
-from simgap.baselines.grey.scenes import scenes_of
+from simgap.baselines.grey.scenes import lattice, scenes_of
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure, Term
 from simgap.effects.effect import Start
 from simgap.records import Channels, Experiment, Kind
@@ -100,10 +101,12 @@ class Search:
     structure: Structure
     plain: Estimate
     cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
+    outliers: list[Outliers] = field(default_factory=list)  # found in the readings, and left out of both records
     threads: int = 2
     noise_order: int = 0
     path: list[Trial] = field(default_factory=list)
     rounds: list[tuple[Trial, list[Trial]]] = field(default_factory=list)
+    _tried: dict[Any, list[Trial]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -113,14 +116,24 @@ class Search:
         records = Records.of(excerpts(train), outputs)
         held_out = Records.of(excerpts(valid), outputs) if valid else records
         cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
+        kind = channels.outputs[outputs[0]].kind
+        tried = plain_models(records, held_out, kind)
+        off = (
+            find(tried[-1].errors, records.mask)
+            if not any(lattice(records.y[..., j]) for j in range(len(outputs)))
+            else []
+        )
+        if off:
+            records = left_out(records, tried[-1].errors, off)
+            held_out = left_out(held_out, errors_on(tried[-1], held_out), off) if valid else records
+            tried = plain_models(records, held_out, kind)
 
         def started(plain: Estimate) -> Search:
             problem = Problem(plain.structure, records, white(np.ones(plain.structure.ny)))
             structure = replace(plain.structure, scenes=scenes_of(plain, problem, channels, outputs))
             plain = replace(plain, structure=structure)
-            return cls(records, held_out, channels, tuple(outputs), structure, plain, cut)
+            return cls(records, held_out, channels, tuple(outputs), structure, plain, cut, off)
 
-        tried = plain_models(records, held_out, channels.outputs[outputs[0]].kind)
         search = started(tried[-1])
         for simpler in tried[:-1]:
             # A higher order is no answer where a delay, which costs no more, does as well.
@@ -278,6 +291,9 @@ class Search:
 
     def round(self, here: Estimate, names: Sequence[str] = ()) -> list[Trial]:
         """Every candidate (of those named) added to a model, refitted and assessed; the best first."""
+        key = (frozenset(term.key for term in here.structure.terms), tuple(names))
+        if key in self._tried:
+            return self._rank([self._again(trial) for trial in self._tried[key]])
         problem = Problem(here.structure, self.train, self.base_noise)
         slopes = problem.slopes(here.theta, here.local, here.structure.free)
         terms = [t for t in self.candidates(here.structure.terms) if not names or t.effect.name in names]
@@ -289,7 +305,8 @@ class Search:
             return self.assess(fit if fit.converged else self.fit(fit.structure.terms, [(fit.theta, fit.local)]))
 
         begun = sorted((fit for fit in self._map(attempt, terms) if fit is not None), key=self._cost)
-        return self._rank(self._map(finish, begun[:FINALISTS]))
+        self._tried[key] = self._map(finish, begun[:FINALISTS])
+        return self._rank(self._tried[key])
 
     def _map(self, work: Callable[[T], R], items: Sequence[T]) -> list[R]:
         if self.threads < 2:
@@ -488,10 +505,20 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
     return Problem(structure, train, noise).fit(theta, held.local)
 
 
+def errors_on(fit: Estimate, records: Records) -> np.ndarray:
+    """Errors [E, T, ny] of a fitted model on other records, each from the start that suits it best."""
+    fixed = np.ones(fit.structure.size, dtype=bool)
+    return (
+        Problem(fit.structure, records, white(np.ones(fit.structure.ny)))
+        .fit(fit.theta, fixed=fixed, max_steps=10)
+        .errors
+    )
+
+
 def block_errors(fit: Estimate, valid: Records) -> np.ndarray:
     """Mean squares of held-out free runs, in about twenty blocks."""
     fixed = np.ones(fit.structure.size, dtype=bool)
-    errors = Problem(fit.structure, valid, white(np.ones(1))).fit(fit.theta, fixed=fixed, max_steps=10).errors
+    errors = errors_on(fit, valid)
     squares = np.where(valid.mask[:, :, None], errors**2, 0.0)
     blocks = np.array_split(squares, max(2, 20 // len(squares)), axis=1)
     return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

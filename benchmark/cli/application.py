@@ -9,13 +9,14 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import catalogue, data, fitting, reporting, running
+from simgap.cli import catalogue, data, diagnosing, fitting, reporting, running
 from simgap.records import UnusableInput
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command("run")(running.run)
 app.command("report")(reporting.report)
 app.command("list")(catalogue.show)
+app.command("diagnose")(diagnosing.diagnose)
 app.command("fit")(fitting.fit)
 app.add_typer(data.app, name="data")
 

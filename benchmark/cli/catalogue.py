@@ -16,17 +16,18 @@ class Kind(StrEnum):
 
     models = "models"
     datasets = "datasets"
+    effects = "effects"
     suites = "suites"
 
 
 def show(kind: Annotated[Kind, typer.Argument(help="What to list.")], json: Json = None) -> None:
-    """List the models, data sets or suites by name, with the reason where one cannot be used."""
+    """List the models, data sets, effects or suites by name, with the reason where one cannot be used."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    entries = {Kind.models: _models, Kind.datasets: _datasets, Kind.suites: _suites}[kind]()
+    entries = {Kind.models: _models, Kind.datasets: _datasets, Kind.effects: _effects, Kind.suites: _suites}[kind]()
     if json is not None:
         write_json(json, entries)
     table = Table("name", "what it is", box=box.SIMPLE_HEAD)
@@ -57,6 +58,17 @@ def _datasets() -> list[dict[str, str]]:
         {"name": name, "title": "" if missing else _first_line(DATASETS[name]), "missing": missing}
         for name, missing in available().items()
     ]
+
+
+def _effects() -> list[dict[str, str]]:
+    from simgap.registry import EFFECTS
+
+    effects = [EFFECTS[name] for name in EFFECTS]
+    return [
+        {"name": e.name, "port": e.port, "title": e.title, "explanation": e.explanation, "reference": e.reference,
+         "missing": ""}
+        for e in sorted(effects, key=lambda e: (("input", "force", "output").index(e.port), e.name))
+    ]  # fmt: skip
 
 
 def _suites() -> list[dict[str, str]]:

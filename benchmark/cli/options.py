@@ -37,6 +37,13 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
     return params
 
 
+def check_writable(*files: Path | None) -> None:
+    """Raises UnusableInput, before any work is done, for a file whose folder does not exist or that is a folder."""
+    for file in files:
+        if file is not None and (file.is_dir() or not file.parent.is_dir()):
+            raise UnusableInput(f"{file} cannot be written: give a file in a folder that exists")
+
+
 def write_json(path: Path, value: Any) -> None:
     """Strict JSON, indented."""
     path.write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

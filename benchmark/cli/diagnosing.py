@@ -1,0 +1,31 @@
+"""`simgap diagnose`: what the simulation gets wrong, and why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, check_writable, write_json
+
+
+def diagnose(
+    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    dt: SamplingTime = None,
+    seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
+    json: Json = None,
+    html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
+) -> None:
+    """Show what a linear model of the data gets wrong, name the physical cause and measure what it gains."""
+    from simgap.diagnosis.diagnose import diagnose
+
+    check_writable(json, html)
+    answer = diagnose(data, inputs or (), outputs or (), dt, seed, profiles=html is not None)
+    if json is not None:
+        write_json(json, answer.to_json())
+    if html is not None:
+        html.write_text(answer.to_html(), encoding="utf-8")
+    typer.echo(str(answer))

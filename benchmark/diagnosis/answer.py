@@ -1,0 +1,53 @@
+"""The answer of `simgap.diagnose`: findings that show themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from simgap.findings import Findings
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was found, as a text, a page or JSON; `model` simulates with the named causes (`greybox-auto`)."""
+
+    findings: Findings
+    seconds: float
+    model: Any
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "findings", replace(self.findings, seconds=self.seconds))
+
+    @property
+    def verdict(self) -> str:
+        """named, nothing_found or unexplained."""
+        return self.findings.verdict
+
+    @property
+    def causes(self) -> tuple[Any, ...]:
+        """The named effects, in the order of what they explain."""
+        return self.findings.causes
+
+    def to_json(self) -> dict[str, Any]:
+        """Schema 1 of `simgap diagnose --json`."""
+        return self.findings.to_json()
+
+    def to_html(self) -> str:
+        """One page that needs nothing else."""
+        from simgap.reports.diagnosis_page import diagnosis_page
+
+        return diagnosis_page(self.findings)
+
+    def __str__(self) -> str:
+        from simgap.reports.diagnosis_text import diagnosis_text
+
+        return diagnosis_text(self.findings)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the page in a frame of its own."""
+        import html
+
+        return f'<iframe style="width:100%;height:900px;border:0" srcdoc="{html.escape(self.to_html())}"></iframe>'

@@ -1,0 +1,41 @@
+"""What the records themselves show before any model is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simgap.records import Dataset
+
+SHORT = 200  # samples in training below which little can be told
+
+
+def look(dataset: Dataset) -> tuple[str, ...]:
+    """One sentence for each thing about the training data that a reader of the answer should know."""
+    training = dataset.training
+    sentences = []
+    samples = sum(map(len, training.train))
+    if samples < SHORT:
+        sentences.append(f"Only {samples} training samples: weak effects cannot be told from noise.")
+    if not training.valid:
+        sentences.append("There are no validation data: effects were accepted on the training data alone.")
+    if len(training.train) == 1:
+        sentences.append(
+            "One training experiment: a drift of the sensor cannot be told from a slow change of the plant."
+        )
+    for i, channel in enumerate(dataset.channels.outputs):
+        y = np.concatenate([x.y[:, i] for x in training.train])
+        for limit, word in ((y.max(), "largest"), (y.min(), "smallest")):
+            times = int(np.sum(y == limit))
+            if times > max(5, 0.005 * len(y)) and np.ptp(y) > 0:
+                sentences.append(
+                    f"{channel.name} reads its {word} value, {limit:.4g} {channel.unit}".rstrip()
+                    + f", {times} times: something ends there."
+                )
+        values = np.unique(y)
+        if 3 <= len(values) < 0.05 * len(y) and len(values) < 500:
+            sentences.append(f"{channel.name} takes only {len(values)} different values: its reading is coarse.")
+    for i, channel in enumerate(dataset.channels.inputs):
+        u = np.concatenate([x.u[:, i] for x in training.train])
+        if u.min() >= 0 or u.max() <= 0:
+            sentences.append(f"The input {channel.name} never changes its sign: effects around zero cannot show.")
+    return tuple(sentences)

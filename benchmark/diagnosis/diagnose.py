@@ -1,0 +1,125 @@
+"""`simgap.diagnose`: what the simulation gets wrong, which cause, what it gains."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from simgap.diagnosis import checks, gains
+from simgap.diagnosis.answer import Diagnosis
+from simgap.diagnosis.causes import causes_of, runner_up
+from simgap.diagnosis.views import views
+from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
+from simgap.metrics import relative
+from simgap.records import Dataset
+from simgap.registry import MODELS
+
+# The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
+LEFT_OF_PLAIN = 0.05
+LEFT_OF_EXPLAINED = 0.1
+# Views of the error are listed when chance gives as much in fewer cases than this.
+MORE_THAN_CHANCE = 0.01
+VIEW_SAMPLES = 70_000
+
+
+def diagnose(
+    data: Any,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    seed: int = 0,
+    profiles: bool = False,
+) -> Diagnosis:
+    """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
+
+    `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the intervals and
+    of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it.
+    Raises UnusableInput.
+    """
+    from simgap.data import load
+
+    begin = time.perf_counter()
+    dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
+    model = MODELS["greybox-auto"]()
+    model.fit(dataset.training, seed)
+    plain = model.plain()
+    before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
+    after = [gains.best_run(model, x, dataset.n_init) for x in dataset.test]
+    causes = causes_of(model, dataset.channels, profiles)
+    left, offers = _left(model, dataset)
+    explained = min((part.explained for part in model.parts()), default=0.0) if causes else 0.0
+    verdict: Verdict = "named" if causes else "nothing_found"
+    if left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained:
+        verdict, causes = "unexplained", ()
+        after = before
+    findings = Findings(
+        dataset=dataset.name,
+        verdict=verdict,
+        baseline=_baseline(plain, dataset, before),
+        wrong=_wrong(plain, dataset, seed),
+        causes=causes,
+        runner_up=runner_up(model) if verdict == "named" else None,
+        gain=gains.measure(dataset, before, after, seed),
+        seconds=0.0,
+        units={channel.name: channel.unit for channel in dataset.channels.outputs},
+        inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
+        kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
+        checks=checks.look(dataset),
+        left=left,
+        offers=offers if verdict == "unexplained" else (),
+        traces=_traces(dataset, before, after),
+        seed=seed,
+    )
+    return Diagnosis(findings, time.perf_counter() - begin, model)
+
+
+def _baseline(plain: Any, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, Any]:
+    rmse, fit = {}, {}
+    y = np.concatenate([x.y[dataset.n_init :] for x in dataset.test])
+    y_hat = np.concatenate(before)
+    for i, channel in enumerate(dataset.channels.outputs):
+        error = float(np.sqrt(np.mean((y[:, i] - y_hat[:, i]) ** 2)))
+        rmse[channel.name] = error
+        fit[channel.name] = relative(error, float(np.std(y[:, i])))["fit_percent"]
+    orders = plain.fitted["order"]
+    return {"order": orders[0] if len(orders) == 1 else orders, "rmse": rmse, "fit_percent": fit}
+
+
+def _wrong(plain: Any, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:
+    """The views of the plain model's free runs on training and validation data; the test split is not looked at."""
+    experiments, samples = [], 0
+    for x in (*dataset.training.train, *dataset.training.valid):
+        if len(x) > dataset.n_init + 2 and samples < VIEW_SAMPLES:
+            experiments.append(x[:VIEW_SAMPLES])
+            samples += len(experiments[-1])
+    simulated = [gains.free_run(plain, x, dataset.n_init) for x in experiments]
+    seen = views(experiments, simulated, dataset.channels, dataset.n_init, seed)
+    return tuple(
+        Wrong(view.view, view.output, view.share, view.chance, view.text, view.at, view.error, view.unit)
+        for view in seen
+        if view.chance < MORE_THAN_CHANCE and view.share > 0.01
+    )
+
+
+def _left(model: Any, dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:
+    """The largest share of the plain model's squared error that is left and could be predicted, and formulas for it."""
+    left, offers = 0.0, []
+    for part in model.parts():
+        rest = part.leftover()
+        left = max(left, rest.share * (1 - part.explained))
+        if rest.share * (1 - part.explained) > LEFT_OF_PLAIN:
+            from simgap.diagnosis.offers import formula
+
+            offers.append(formula(rest, dataset.channels.outputs[part.outputs[0]]))
+    return left, tuple(offers)
+
+
+def _traces(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray]) -> tuple[Trace, ...]:
+    n = dataset.n_init
+    return tuple(
+        Trace(x.name, x.dt * np.arange(n, len(x)), x.u[n:], x.y[n:], b, a)
+        for x, b, a in zip(dataset.test, before, after, strict=True)
+    )
