@@ -37,6 +37,8 @@ class GreyBox:
             search = Search.of(data.train, data.valid, data.channels, outputs)
             found = search.plain
             for effect, plant, channel in placed:
+                if effect.name == "outliers":
+                    continue  # left out by the search itself
                 if plant is None or plant == outputs:
                     found = search.add(found, Term(effect, channel))
             self.machines.append(Machine.fit(found, search, data.train + data.valid))
@@ -57,6 +59,10 @@ class GreyBox:
         for machine in self.machines:
             y_hat[:, list(machine.outputs)] = machine.again(experiment, n_init)
         return y_hat
+
+    def log_likelihood(self) -> float:
+        """Of the training errors, as white noise on each output, up to a constant."""
+        return sum(machine.log_likelihood() for machine in self.machines)
 
     @property
     def n_params(self) -> int:

@@ -97,6 +97,11 @@ class Machine:
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat
 
+    def log_likelihood(self) -> float:
+        """Of the errors as white noise, up to a constant."""
+        e = self.estimate.errors[self.records.mask]
+        return float(-0.5 * len(e) * np.sum(np.log(np.mean(e * e, axis=0) + 1e-300)))
+
     def intervals(self) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
         """95 % intervals of theta, honest for coloured errors and for what the model cannot explain.
 

@@ -35,7 +35,15 @@ def run(
     dt: SamplingTime = None,
     json: Json = None,
 ) -> None:
-    """Fit models to data sets and score their free-run simulation; a second run carries on."""
+    """Fit models to data sets and score their free-run simulation; a second run carries on.
+
+    The suite hide-and-seek instead hides physical effects in simulated rigs (--datasets names them) and counts how
+    often `simgap diagnose` finds them.
+    """
+    if suite == "hide-and-seek":
+        from simgap.cli import seeking
+
+        return seeking.run(jobs, out, seeds, names(datasets), json)
     from rich.console import Console
 
     from simgap import runner, store

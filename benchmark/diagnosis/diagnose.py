@@ -32,11 +32,13 @@ def diagnose(
     dt: float | None = None,
     seed: int = 0,
     profiles: bool = False,
+    views_too: bool = True,
 ) -> Diagnosis:
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
     `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the intervals and
-    of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it.
+    of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it; without
+    `views_too` the views of the error are left out.
     Raises UnusableInput.
     """
     from simgap.data import load
@@ -59,7 +61,7 @@ def diagnose(
         dataset=dataset.name,
         verdict=verdict,
         baseline=_baseline(plain, dataset, before),
-        wrong=_wrong(plain, dataset, seed),
+        wrong=_wrong(plain, dataset, seed) if views_too else (),
         causes=causes,
         runner_up=runner_up(model) if verdict == "named" else None,
         gain=gains.measure(dataset, before, after, seed),
