@@ -108,6 +108,19 @@ class Problem:
             local[:, 0] = first[:, 0]
         return local
 
+    def other_side(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Local numbers with the start, or the first reading, on the side of zero that simulates each experiment better.
+
+        A reading without a sign does not tell the two apart, and no descent leads from one to the other.
+        """
+        sides = np.ones(local.shape[1])
+        sides[: self.structure.order] = -1
+        guess = local.copy()
+        guess[:, : self.structure.order] = self.first_guess(theta)[:, : self.structure.order]
+        starts = np.stack([local, local * sides, guess, guess * sides])  # [4, E, q]
+        squares = [np.sum(self.noise.whiten(self.errors(theta, start)) ** 2, axis=(1, 2)) for start in starts]
+        return starts[np.argmin(squares, axis=0), np.arange(len(local))]
+
     def slopes(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Slopes:
         """Slopes of the simulation by forward differences, for the parameters `which` of theta."""
         structure, which = self.structure, np.flatnonzero(which)
@@ -174,6 +187,8 @@ class Problem:
         free = structure.free if fixed is None else structure.free & ~fixed
         theta = np.clip(theta, low, high)
         local = self.first_guess(theta) if local is None else local.copy()
+        if structure.signless:
+            local = self.other_side(theta, local)
         errors = self.errors(theta, local)
         squares, damping, converged = self.squares(errors), 1e-3, False
         experiments = len(local)

@@ -71,13 +71,8 @@ class Machine:
         """Local numbers at the first of the measured samples, by least squares on all of them."""
         records = Records(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), structure.dt)
         problem = Problem(structure, records, self.noise)
-        theta, fixed = self.estimate.theta, np.ones(len(self.estimate.theta), dtype=bool)
-        guess = problem.first_guess(theta)
-        signs = (1, -1) if any(term.effect.name == "absolute_sensor" for term in structure.terms) else (1,)
-        tried = [problem.fit(theta, sign * guess, fixed=fixed, max_steps=15) for sign in signs]
-        squares = np.stack([np.sum(self.noise.whiten(fit.errors) ** 2, axis=(1, 2)) for fit in tried])  # [try, B]
-        best = np.argmin(squares, axis=0)
-        return np.stack([fit.local for fit in tried])[best, np.arange(len(y))]
+        fixed = np.ones(len(self.estimate.theta), dtype=bool)
+        return problem.fit(self.estimate.theta, fixed=fixed, max_steps=15).local
 
     def again(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Rows n_init .. T-1 of a free run in which what belongs to this experiment is estimated from all of it."""

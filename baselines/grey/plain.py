@@ -52,7 +52,9 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
             theta[: structure.n_plant] = _same_gain(structure, start, theta)
             tried.append(problem.fit(theta, fixed=~gains, max_steps=5, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)
-    return min((problem.fit(t.theta, t.local) for t in tried[:FINALISTS]), key=lambda fit: fit.squares)
+    fits = [problem.fit(trial.theta, trial.local) for trial in tried[:FINALISTS]]
+    best = min(fits, key=lambda fit: fit.squares)
+    return problem.fit(best.theta, best.local) if structure.signless else best
 
 
 def _same_gain(structure: Structure, before: np.ndarray, theta: np.ndarray) -> np.ndarray:

@@ -79,6 +79,11 @@ class Structure:
         return 1 + self.two_outputs
 
     @property
+    def signless(self) -> bool:
+        """Whether a reading does not tell on which side of zero it is."""
+        return any(term.effect.name == "absolute_sensor" for term in self.terms)
+
+    @property
     def cascade(self) -> bool:
         """Whether the states are the levels of tanks in a row."""
         return self.kind == "level"

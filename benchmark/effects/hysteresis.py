@@ -12,16 +12,14 @@ from simgap.registry import EFFECTS
 @EFFECTS.register("hysteresis")
 @final
 class Hysteresis(ForceEffect):
-    """f = -F z, dz/dt = (v - abs(v) z) / d (Dahl)."""
+    """f = -F z, d dz/dt = v - (abs(v) z + v abs(z)) / 2 (Bouc-Wen, n = 1, beta = gamma)."""
 
     name: ClassVar[str] = "hysteresis"
     title: ClassVar[str] = "hysteresis"
     explanation: ClassVar[str] = (
         "A force that depends on the way it came: it builds up over a certain travel after each reversal and then stays, at any speed. Creeping seals, wire ropes, piezo stacks, presliding friction."
     )
-    reference: ClassVar[str] = (
-        "Dahl, A solid friction model, 1968; Bouc-Wen with n = 1: Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
-    )
+    reference: ClassVar[str] = "Bouc 1967, Wen 1976; Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "sign of velocity")
     twins: ClassVar[dict[str, str]] = {
@@ -48,8 +46,13 @@ class Hysteresis(ForceEffect):
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """The force now; its state follows over the step exactly for a constant velocity."""
-        before = m[j]
-        side = 1.0 if v > 0 else -1.0
-        m[j] = side + (before - side) * math.exp(-abs(v) * h / p[i + 1])
+        """The mean force over the step, with z followed exactly for a constant velocity."""
+        before, way = m[j], v * h / p[i + 1]
+        z = before
+        if way * z < 0:  # back towards zero: elastic
+            back = min(abs(way), abs(z))
+            z += math.copysign(back, way)
+            way -= math.copysign(back, way)
+        side = math.copysign(1.0, way)
+        m[j] = side + (z - side) * math.exp(-abs(way))
         return -p[i] * 0.5 * (before + m[j])

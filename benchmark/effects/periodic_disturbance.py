@@ -48,4 +48,4 @@ class PeriodicDisturbance(ForceEffect):
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
         """A sine over time."""
-        return p[i] * math.sin(6.283185307179586 * p[i + 1] * (t + 0.5 * h) + p[i + 2])
+        return p[i] * math.sin(6.283185307179586 * p[i + 1] * t + p[i + 2])
