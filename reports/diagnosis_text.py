@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 
 from simgap.findings import Cause, Findings
+from simgap.reports import diagnosis_numbers as numbers
 from simgap.reports import diagnosis_words as words
 from simgap.reports.rendering import printable
 
@@ -30,9 +31,11 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         paragraphs += _section("Free-run RMSE on the test experiments", _gain(findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
-        share = f"explains {words.percent(offer.explained)} of the squared error of the force, held out"
+        share = f"explains {numbers.percent(offer.explained)} of the squared error of the force, held out"
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
+    if findings.causes:
+        paragraphs += ["", *_wrapped("Ranges in brackets are 95 % intervals where nothing else is said.", width)]
     return "\n".join(paragraphs) + "\n"
 
 
@@ -43,15 +46,17 @@ def _section(title: str, items: Iterator[str] | list[str] | tuple[str, ...], wid
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Further lines stand deeper, so that one sees where an item begins."""
-    return textwrap.wrap(printable(text), max(width, 20), initial_indent=indent, subsequent_indent=indent + indent)
+    return textwrap.wrap(
+        printable(text), max(width, 20), initial_indent=indent, subsequent_indent=2 * indent, break_on_hyphens=False
+    )
 
 
 def _baseline(findings: Findings) -> Iterator[str]:
     plain = findings.baseline
     yield f"order {words.orders(plain.get('order', 'unknown'))}"
     for name, rmse in plain.get("rmse", {}).items():
-        fit = words.fit(plain.get("fit_percent", {}).get(name, float("nan")))
-        yield f"{name}: free-run RMSE {words.amount(rmse, findings.units.get(name, ''))}, fit {fit}"
+        fit = numbers.fit(plain.get("fit_percent", {}).get(name, float("nan")))
+        yield f"{name}: free-run RMSE {numbers.amount(rmse, findings.units.get(name, ''))}, fit {fit}"
 
 
 def _wrong(findings: Findings) -> list[str]:
@@ -63,18 +68,18 @@ def _wrong(findings: Findings) -> list[str]:
 def _cause(cause: Cause) -> Iterator[str]:
     yield cause.text
     for parameter in cause.parameters:
-        yield f"{parameter.name} = {words.estimate(parameter)} ({words.interval(parameter)})"
+        yield f"{parameter.name} = {numbers.estimate(parameter)} ({numbers.interval(parameter)})"
     yield words.evidence(cause)
     for other in cause.confounded_with:
-        yield f"These data do not tell it from {other.title} - to separate them: {other.experiment}."
+        yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."
 
 
 def _gain(findings: Findings) -> Iterator[str]:
     gain = findings.gain
     for name, before in gain.before.items():
         after, unit = gain.after.get(name, float("nan")), findings.units.get(name, "")
-        change = words.change(before, after)
-        line = f"{name}: {words.amount(before, '')} -> {words.amount(after, unit)}"
+        change = numbers.change(before, after)
+        line = f"{name}: {numbers.amount(before, '')} -> {numbers.amount(after, unit)}"
         yield f"{line} ({change})" if change else line
     if findings.left > 0.01:
-        yield f"The input could still predict {words.percent(findings.left)} of the plain model's squared error."
+        yield f"The input could still predict {numbers.percent(findings.left)} of the plain model's squared error."

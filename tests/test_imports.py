@@ -12,7 +12,7 @@ PARTS = ("baselines", "neural", "data", "reports", "cli", "effects", "diagnosis"
 CONTRACTS = {"records", "protocol", "registry"}
 BENCH = {"metrics", "tasks", "store", "suites", "workers", "provenance", "fitting", "jobs", "planning",
          "runner"}  # fmt: skip
-EVERYTHING = CONTRACTS | BENCH | {"data", "effects", "diagnosis", "reports", "simgap"}
+EVERYTHING = CONTRACTS | BENCH | {"findings", "data", "effects", "diagnosis", "reports", "simgap"}
 
 # part or module -> what it may import besides itself; "simgap" is the package's own version and lazy exports
 ALLOWED = {
@@ -21,14 +21,15 @@ ALLOWED = {
     "effects": CONTRACTS,
     "neural": CONTRACTS | {"data"},
     "baselines": CONTRACTS | {"data", "effects"},
-    "reports": {"records", "metrics", "store", "effects"},
+    "findings": set(),
+    "reports": {"records", "metrics", "store", "findings", "effects"},
     **dict.fromkeys(BENCH, CONTRACTS | BENCH | {"data", "simgap"}),
     "metrics": {"records"},
     "tasks": {"records", "metrics"},
     "store": {"records"},
     "workers": set(),
     "suites": CONTRACTS | {"tasks", "store"},
-    "diagnosis": CONTRACTS | BENCH | {"data", "effects"},
+    "diagnosis": CONTRACTS | BENCH | {"findings", "data", "effects"},
     "cli": EVERYTHING,
     "simgap": EVERYTHING,
 }

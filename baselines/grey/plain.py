@@ -14,14 +14,14 @@ from simgap.baselines.grey.structure import Structure
 FINALISTS = 3
 
 
-def fit_plain(structure: Structure, records: Records) -> Estimate:
-    """The best of several searches from the most promising poles of a grid."""
+def fit_plain(structure: Structure, records: Records, smaller: Estimate | None = None) -> Estimate:
+    """The best of several searches from the most promising poles of a grid, or of a smaller model and one more."""
     problem = Problem(structure, records, white(np.std(records.y[records.mask], axis=0) + 1e-12))
     tried = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
     linear = np.zeros(structure.size, dtype=bool)
     linear[structure.at[1]] = linear[structure.at[2]] = True
-    for shape in poles(structure, records):
+    for shape in poles(structure, records) if smaller is None else extended(structure, records, smaller):
         theta = np.zeros(structure.size)
         theta[structure.at[0]] = shape
         theta[structure.at[4]] = 1.0
@@ -81,9 +81,23 @@ def poles(structure: Structure, records: Records, coarse: bool = False) -> Itera
         sections = [[2 * damping * w, w * w] for w in np.geomspace(2 / duration, 2.5 / dt, 9)
                     for damping in (0.05, 0.3, 1.0)]  # fmt: skip
         sections += [[rate, 0.0] for rate in rates[1::2]]
-        if structure.order == 2:
-            yield from sections
-        elif structure.order == 3:
-            yield from ([*section, rate] for section in sections[::2] for rate in rates[1::2])
-        else:
-            yield from ([*one, *other] for one, other in combinations(sections[::3], 2))
+        yield from sections
+
+
+def extended(structure: Structure, records: Records, smaller: Estimate) -> Iterator[list[float]]:
+    """The poles of a model of lower order and further ones; zeros come after the same poles without them."""
+    before = list(smaller.theta[smaller.structure.at[0]])
+    rates = np.geomspace(0.5 / records.duration, 1.5 / records.dt, 5)
+    if structure.order == len(before):
+        yield before
+    elif structure.cascade:
+        yield from (sorted([*before, rate], reverse=True) for rate in rates)
+        yield from (sorted(before, reverse=True)[:-1] + [before[-1], 1.5 * before[-1]] for _ in range(1))
+    elif len(before) % 2 == 0:
+        yield from ([*before, rate] for rate in rates)
+    else:
+        # The last first-order section becomes one of second order: with a further real pole, or swinging.
+        rest, last = before[:-1], before[-1]
+        yield from ([*rest, last + rate, last * rate] for rate in rates)
+        yield from ([*rest, 2 * damping * w, w * w] for w in np.geomspace(2 / records.duration, 2.5 / records.dt, 7)
+                    for damping in (0.05, 0.4))  # fmt: skip

@@ -461,11 +461,22 @@ def plain_models(train: Records, valid: Records, kind: Kind) -> list[Estimate]:
         return [
             fit_plain(Structure(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2), train)
         ]
-    tried = []
+    tried: list[tuple[Estimate, np.ndarray]] = []
+    smaller, in_vain = None, 0
     for order in range(1, MAX_ORDER + 1):
-        for zeros in (0,) if kind == "level" else tuple(range(order)):
-            fit = fit_plain(Structure(kind, order, nu, dt, zeros=zeros, offset=True), train)
-            tried.append((fit, block_errors(fit, valid)))
+        here = []
+        for zeros in sorted({0, 0 if kind == "level" else order - 1}):
+            structure = Structure(kind, order, nu, dt, zeros=zeros, offset=True)
+            grid = order <= 2 and not zeros
+            fit = fit_plain(structure, train, None if grid else here[0][0] if zeros else smaller)
+            here.append((fit, block_errors(fit, valid)))
+        known = min((squares.mean() for _, squares in tried), default=np.inf)
+        tried += here
+        smaller = here[0][0]
+        # A resonance takes two orders.
+        in_vain = in_vain + 1 if min(squares.mean() for _, squares in here) > (1 - MATTERS) * known else 0
+        if in_vain == 2:
+            break
     best = min((squares for _, squares in tried), key=np.mean)
     chosen = []
     for fit, squares in tried:  # from the simplest on

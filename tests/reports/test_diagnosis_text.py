@@ -1,0 +1,153 @@
+import math
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from simgap.findings import Value
+from simgap.reports.diagnosis_numbers import interval, number, numbers, percent
+from simgap.reports.diagnosis_text import diagnosis_text
+
+EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
+named, nothing_found, unexplained, hostile = (
+    EXAMPLES[name] for name in ("named", "nothing_found", "unexplained", "hostile")
+)
+
+CART = """\
+cart: The simulation errs because of Coulomb friction; with it the free-run error on the test
+experiments falls by 38 % (33 to 43 %).
+
+Plain linear model
+  order 2
+  x: free-run RMSE 1.24 mm, fit 81.2 %
+
+What it gets wrong
+  The simulation of x is 0.8 mm too high when moving forwards: 61 % of its squared error.
+  The simulation of x is too high at high speed: 22 % of its squared error.
+
+Cause 1: Coulomb friction
+  Dry friction: a force of constant size against the motion.
+  friction force = 6.84 mm/s^2 (6.71 to 6.97)
+  It explains 91 % of the plain model's squared error in training (log-likelihood ratio 412); on
+    held-out data the squared error is 62 % smaller with it than without.
+  These data do not tell it from backlash - to separate them: stop and start again in the same
+    direction: play is already taken up.
+
+Runner-up
+  Viscous drag; by itself it would make the held-out squared error 21 % smaller, 35.2 behind in
+    log-likelihood.
+
+Free-run RMSE on the test experiments
+  x: 1.24 -> 0.768 mm (-38 %)
+
+About the data
+  Only 150 training samples: weak effects cannot be told from noise.
+
+Ranges in brackets are 95 % intervals where nothing else is said.
+"""
+
+
+def in_one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_a_named_cause_reads_like_this(named):
+    assert diagnosis_text(named) == CART
+
+
+def test_nothing_found_names_no_cause_and_no_gain(nothing_found):
+    text = in_one_line(diagnosis_text(nothing_found))
+    assert "cart: Nothing found:" in text
+    assert "Cause 1" not in text
+    assert "->" not in text
+
+
+def test_an_offer_is_called_an_offer(unexplained):
+    text = in_one_line(diagnosis_text(unexplained))
+    assert "Something is there, but nothing in the catalogue explains it: 27 % of" in text
+    assert "An offer to look at, not a finding" in text
+    assert "force ~ +1 x^3 -0.2 v" in text
+    assert "explains 44 % of the squared error of the force, held out" in text
+    assert "Cause 1" not in text
+
+
+def test_an_effect_of_single_experiments_says_that_it_cannot_be_forecast(named):
+    slope = Value("slope, rms over experiments", "mm/s", 0.251, 0.0015, 0.644)
+    cause = replace(named.causes[0], per_experiment=True, parameters=(slope,))
+    text = in_one_line(diagnosis_text(replace(named, causes=(cause,))))
+    assert "cannot be forecast: this is measured with the parameter estimated anew" in text
+    assert "slope, rms over experiments = 0.25 mm/s (0 to 0.64 in single experiments)" in text
+
+
+def test_causes_are_told_apart_by_channel_where_there_are_several(named):
+    drifts = tuple(replace(named.causes[0], title="sensor drift", channel=name) for name in ("x", "v"))
+    text = in_one_line(diagnosis_text(replace(named, causes=drifts, units={"x": "mm", "v": "mm/s"})))
+    assert "because of sensor drift (x) and sensor drift (v); with them the free-run error" in text
+
+
+def test_the_frequency_band_is_named_only_for_want_of_other_views(named):
+    band = replace(named.wrong[0], view="frequency band", share=0.9, text="The error is slow.")
+    assert "The error is slow." not in diagnosis_text(replace(named, wrong=(band, *named.wrong)))
+    assert "The error is slow." in diagnosis_text(replace(named, wrong=(band,)))
+
+
+def test_views_that_chance_explains_are_left_out(named):
+    by_chance = replace(named.wrong[0], chance=0.04)
+    assert "No view of its error shows more than chance" in diagnosis_text(replace(named, wrong=(by_chance,)))
+
+
+def test_a_worse_simulation_is_said_to_be_worse(named):
+    worse = replace(named.gain, share=-0.12, low=-0.2, high=-0.05)
+    assert "error on the test experiments rises by 12 % (5 to 20 %)." in in_one_line(
+        diagnosis_text(replace(named, gain=worse))
+    )
+
+
+def test_a_simulation_that_diverges_is_said_to_diverge(named):
+    gain = replace(named.gain, before={"x": math.inf}, share=math.nan, low=math.nan, high=math.nan)
+    text = diagnosis_text(replace(named, gain=gain, baseline={"order": 2, "rmse": {"x": math.inf}, "fit_percent": {}}))
+    assert "x: free-run RMSE diverges" in text
+    assert "x: diverges -> 0.768 mm" in text
+
+
+def test_names_are_shown_and_not_obeyed(hostile):
+    text = diagnosis_text(hostile)
+    assert all(c.isprintable() or c == "\n" for c in text)
+    assert "\x1b" not in text
+    assert "[2J" in text
+
+
+@pytest.mark.parametrize("width", [20, 40, 72, 100])
+def test_lines_keep_to_the_width(named, width):
+    assert max(map(len, diagnosis_text(named, width).splitlines())) <= width
+
+
+@pytest.mark.parametrize(
+    ("estimate", "shown"),
+    [
+        ((6.8432, 6.7112, 6.9743), ("6.84", "6.71", "6.97")),
+        ((190.6, 154.4, 226.8), ("191", "154", "227")),
+        ((0.0954, 0.0, 1.5), ("0.095", "0", "1.50")),
+        ((0.0017575, -0.0066852, 0.0102), ("0.0018", "-0.0067", "0.0102")),
+        ((1.0, 0.6175, 1.0), ("1", "0.62", "1")),
+        ((1.234567e-7, 1.1e-7, 1.4e-7), ("1.23e-7", "1.10e-7", "1.40e-7")),
+        ((123456789.0, 120000000.0, 126000000.0), ("1.235e8", "1.200e8", "1.260e8")),
+        ((123456.0, 110000.0, 140000.0), ("123000", "110000", "140000")),
+        ((2.0, math.nan, math.nan), ("2", "nan", "nan")),
+    ],
+)
+def test_an_estimate_has_the_digits_that_its_interval_deserves(estimate, shown):
+    assert numbers(*estimate) == shown
+
+
+def test_a_parameter_that_was_not_estimated_has_no_interval():
+    assert interval(Value("mid level", "V", 6.5, 6.5, 6.5)) == "read off the data, not estimated"
+
+
+def test_numbers_have_three_digits_and_are_not_rounded_before_the_point():
+    assert [number(v) for v in (0.0, 0.0012345, 0.6075, 26.78, 1234.5)] == ["0", "0.00123", "0.608", "26.8", "1234"]
+
+
+def test_percents_show_what_lacks_to_everything():
+    assert [percent(v) for v in (0.0, 0.004, 0.613, 0.9968, 1.0)] == ["0 %", "less than 1 %", "61 %", "99.7 %", "100 %"]
