@@ -14,6 +14,7 @@ from simgap.baselines.grey.simulation import Simulator
 from simgap.baselines.grey.structure import Structure
 from simgap.records import Experiment
 
+LARGEST_ERROR = 1e60  # of a simulation that grows without bound; its square is still a number
 DIFFERENCE = 1e-5  # of a parameter's size: the step of its numerical slope
 
 
@@ -86,8 +87,11 @@ class Problem:
         self._spread = np.std(records.y[records.mask], axis=0) + 1e-12
 
     def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
-        """Measured minus simulated; 0 where nothing was measured."""
-        return (self.records.y - self.simulator.run(theta, local)) * self.records.weights
+        """Measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
+        errors = (self.records.y - self.simulator.run(theta, local)) * self.records.weights
+        if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR:  # nor when it is not a number
+            errors = np.clip(np.nan_to_num(errors, nan=LARGEST_ERROR), -LARGEST_ERROR, LARGEST_ERROR)
+        return errors
 
     def squares(self, errors: np.ndarray) -> float:
         """The sum of squares of the whitened errors."""

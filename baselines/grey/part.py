@@ -12,11 +12,12 @@ from simgap.baselines.grey.leftover import Leftover, look_for_more
 from simgap.baselines.grey.least_squares import Problem
 from simgap.baselines.grey.machine import Machine
 from simgap.baselines.grey.outliers import Outliers
-from simgap.baselines.grey.search import Search, Trial
+from simgap.baselines.grey.search import Search, Trial, replaces
 from simgap.baselines.grey.structure import Term
 from simgap.records import Channels
 from simgap.registry import EFFECTS
 
+ENOUGH = 20_000  # samples for a profile; of longer records it is drawn from the excerpts of the search
 PROFILE = (-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0)  # half widths of the 95 % interval
 
 
@@ -86,9 +87,10 @@ class Part:
         for term, without in self.losses:
             evidence = (without.estimate.squares - here.estimate.squares) / plain
             gain = 1 - here.blocks.sum() / max(without.blocks.sum(), 1e-300)
-            named.append(
-                Named(term, float(evidence), float(gain), here.train - without.train, self._numbers(term, low, high))
-            )
+            ratio = here.train - without.train
+            if term.effect.obvious:  # seen in the readings, and confirmed by plain squares
+                ratio = -0.5 * self.search.train.samples * math.log(here.estimate.squares / without.estimate.squares)
+            named.append(Named(term, float(evidence), float(gain), ratio, self._numbers(term, low, high)))
         return named
 
     def _outlier(self, found: Outliers) -> Named:
@@ -128,7 +130,7 @@ class Part:
         others = []
         for trial in trials:
             new = [t for t in trial.terms if t not in without.terms]
-            if new and new[0].effect.name != term.effect.name and self.search.significant(without, trial):
+            if new and not replaces(new[0], term) and new[0].effect.name != term.effect.name and self.search.significant(without, trial):
                 gain = 1 - trial.blocks.sum() / max(without.blocks.sum(), 1e-300)
                 others.append(Rival(new[0].effect.name, float(gain), self.found.score - trial.score))
         return others
@@ -147,7 +149,7 @@ class Part:
                     trials[0].score - trial.score,
                 )
                 for trial in trials
-                if not taken & set(trial.names)
+                if not taken & set(trial.names) and not any(replaces(trial.terms[-1], t) for t in self.found.terms)
             ]
         return rivals
 
@@ -163,13 +165,16 @@ class Part:
 
     def profiles(self, term: Term) -> list[tuple[str, str, tuple[float, ...], tuple[float, ...]]]:
         """2 (log L_max - log L) over values of each parameter, everything else fitted anew."""
-        estimate = self.found.estimate
+        few = self.machine.records.samples <= ENOUGH
+        estimate, records = (
+            (self.machine.estimate, self.machine.records) if few else (self.found.estimate, self.search.train)
+        )
         structure = estimate.structure
         if term not in structure.terms or term in structure.local:
             return []
-        problem = Problem(structure, self.search.train, self.search.base_noise)
+        problem = Problem(structure, records, self.search.base_noise)
         low, high = self.machine.intervals()
-        n = self.search.train.samples * structure.ny
+        n = records.samples * structure.ny
         drawn = []
         for i, parameter in zip(
             range(*structure.term_at(term).indices(structure.size)), structure.parameters_of(term), strict=True

@@ -43,7 +43,7 @@ def separation(effect: Any, other: Any) -> Separation:
     """The experiment that would tell two effects apart, as either of them knows it."""
     experiment = effect.twins.get(other.name) or other.twins.get(effect.name)
     if not experiment:
-        shows = " and ".join(effect.shows_in[:1] + other.shows_in[:1])
+        shows = " and ".join(dict.fromkeys(effect.shows_in[:1] + other.shows_in[:1]))
         experiment = f"vary the amplitude and the speed of the input more, and look at the error against {shows}"
     return Separation(other.name, other.title, experiment)
 
