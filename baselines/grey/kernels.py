@@ -156,3 +156,8 @@ def run_plant(
                 for i in range(n):
                     z[i], before[i] = new[i], force[i]
                 step += 1
+
+
+# The compiled function itself: numba would work out the types of the terms anew at every call, which takes longer than
+# most simulations. Whoever calls it keeps to the one signature.
+run_plant_directly = run_plant.overloads[run_plant.signatures[0]].entry_point

@@ -301,8 +301,13 @@ class Search:
         def attempt(term: Term) -> Estimate | None:
             return self.extend(here, term, slopes, FEW_STEPS)
 
+        before = problem.squares(here.errors)
+        n = self.train.samples * self.structure.ny
+
         def finish(fit: Estimate) -> Trial:
-            return self.assess(fit if fit.converged else self.fit(fit.structure.terms, [(fit.theta, fit.local)]))
+            hopeless = 0.5 * n * math.log(before / fit.squares) < WORTH_A_REFIT and not fit.structure.local
+            done = fit.converged or hopeless
+            return self.assess(fit if done else self.fit(fit.structure.terms, [(fit.theta, fit.local)]))
 
         begun = sorted((fit for fit in self._map(attempt, terms) if fit is not None), key=self._cost)
         self._tried[key] = self._map(finish, begun[:FINALISTS])

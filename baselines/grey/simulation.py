@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numba import cfunc
 
-from simgap.baselines.grey.kernels import SLOTS, TERM, run_plant, transition
+from simgap.baselines.grey.kernels import SLOTS, TERM, run_plant_directly, transition
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure
 from simgap.effects.effect import InputEffect, OutputEffect
 
@@ -78,7 +78,7 @@ class Simulator:
             rates[i] = -np.diag(a)
         states = np.empty((s, experiments, samples, n))
         entry, fast = (0, 0) if structure.cascade else (n - 1, min(1, n - 1))
-        run_plant(
+        run_plant_directly(
             e, g0, g1, rates, entry, fast, np.stack([self.drive(theta) for theta in thetas]),
             np.ascontiguousarray(starts), self.substeps, self.h, self._terms, self._n_terms, self._roles,
             np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,

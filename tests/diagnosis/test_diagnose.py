@@ -1,0 +1,154 @@
+"""Hide and seek: an effect is hidden in a rig, and the diagnosis must find it; where nothing is, it must say so."""
+
+import json
+import secrets
+
+import numpy as np
+import pytest
+
+import simgap
+from simgap.data.gimbal import Gimbal, gimbal_dataset
+from simgap.data.rigs import hide, suitable
+from simgap.diagnosis.diagnose import diagnose
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
+
+# Twins of the design: what the data may not separate must at least be named as confounded.
+PLAIN_TO_SEE = {
+    "cart": ("dead_zone", "input_saturation", "coulomb_friction", "backlash", "input_delay", "constant_load"),
+    "stage": ("cubic_stiffness", "coulomb_friction", "sensor_saturation", "position_torque", "hysteresis"),
+    "tank": ("sqrt_outflow", "overflow", "gain_fade"),
+}
+
+
+def hidden_somewhere():
+    """An effect and a seed that nobody knows before the answer is there; printed when the test fails."""
+    rng = np.random.default_rng(secrets.randbits(64))
+    rig = str(rng.choice(list(PLAIN_TO_SEE)))
+    return rig, str(rng.choice(PLAIN_TO_SEE[rig])), int(rng.integers(1_000_000))
+
+
+def answers(diagnosis):
+    return [{cause.effect, *(s.effect for s in cause.confounded_with)} for cause in diagnosis.causes]
+
+
+@pytest.mark.parametrize("attempt", range(3))
+def test_an_effect_that_is_hidden_in_a_rig_is_named_first(attempt):
+    rig, effect, seed = hidden_somewhere()
+    diagnosis = diagnose(hide(rig, {effect: 1.0}, noise=0.05, seed=seed))
+    assert diagnosis.verdict == "named", (rig, effect, seed)
+    assert effect in answers(diagnosis)[0], (rig, effect, seed)
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+def test_where_nothing_is_hidden_nothing_is_named(colour):
+    seed = secrets.randbits(20)
+    assert diagnose(hide("stage", {}, noise=0.1, colour=colour, seed=seed)).verdict == "nothing_found", seed
+
+
+def test_two_effects_at_once_are_both_named():
+    diagnosis = diagnose(hide("cart", {"coulomb_friction": 1.0, "dead_zone": 1.0}, noise=0.05, seed=3))
+    named = set().union(*answers(diagnosis))
+    assert {"coulomb_friction", "dead_zone"} <= named
+
+
+def test_an_effect_outside_the_catalogue_is_unexplained_and_a_formula_is_offered():
+    diagnosis = diagnose(hide("stage", {"squared_input": 1.0}, noise=0.05, seed=1))
+    assert diagnosis.verdict == "unexplained"
+    assert diagnosis.causes == ()
+    assert "u |u|" in diagnosis.findings.offers[0].formula
+    assert "offer" in str(diagnosis)
+
+
+def test_what_belongs_to_single_experiments_is_marked_and_never_forecast():
+    diagnosis = diagnose(hide("cart", {"sensor_drift": 1.0}, noise=0.05, seed=4))
+    assert diagnosis.causes[0].effect == "sensor_drift"
+    assert diagnosis.causes[0].per_experiment
+    assert diagnosis.findings.gain.share > 0.5
+    x = hide("cart", {"sensor_drift": 1.0}, noise=0.05, seed=4).test[0]
+    forecast = diagnosis.model.simulate(x.u[None], x.y[None, :20])[0]
+    assert np.std(np.diff(forecast[:, 0] - x.y[20:, 0])) > 0  # a plain simulation, without the drift
+
+
+def test_a_friction_in_the_gimbal_is_named():
+    gimbal = Gimbal.linear(coulomb=0.15)
+    dataset = gimbal_dataset(gimbal, seed=5, n_train=12, n_valid=4, n_test=3)
+    assert diagnose(dataset).causes[0].effect in ("coulomb_friction", "stribeck_friction")
+
+
+@pytest.fixture(scope="module")
+def friction():
+    return diagnose(hide("stage", {"coulomb_friction": 0.5}, noise=0.05, seed=8), profiles=True)
+
+
+def test_the_size_of_the_cause_lies_in_its_interval_and_has_its_unit(friction):
+    value = friction.causes[0].parameters[0]
+    assert value.unit == "mm/s^2"
+    assert value.value == pytest.approx(25.0, rel=0.1)
+    assert value.low < 25.0 < value.high
+
+
+def test_the_json_has_the_keys_of_schema_1(friction):
+    answer = json.loads(json.dumps(friction.to_json(), allow_nan=False))
+    assert answer["schema"] == 1
+    assert set(answer) >= {
+        "schema", "dataset", "verdict", "baseline", "wrong", "causes", "runner_up", "gain", "seconds"
+    }  # fmt: skip
+    assert set(answer["baseline"]) >= {"order", "rmse", "fit_percent"}
+    assert set(answer["wrong"][0]) >= {"view", "share", "text"}
+    assert set(answer["causes"][0]) >= {
+        "effect", "title", "text", "evidence", "gain", "parameters", "per_experiment", "confounded_with"
+    }  # fmt: skip
+    assert set(answer["causes"][0]["parameters"][0]) == {"name", "unit", "value", "low", "high"}
+    assert set(answer["gain"]) == {"before", "after", "share", "low", "high"}
+    assert answer["gain"]["low"] <= answer["gain"]["share"] <= answer["gain"]["high"]
+
+
+def test_the_gain_is_that_of_the_models_on_the_leaderboard(friction):
+    dataset = hide("stage", {"coulomb_friction": 0.5}, noise=0.05, seed=8)
+    for model, side in (("greybox", "before"), ("greybox-auto", "after")):
+        rows = [r for r in simgap.fit(model, dataset).results if r.task == "free_run"]
+        rmse = np.sqrt(np.mean([r.metrics["x"]["mse"] for r in rows]))
+        assert getattr(friction.findings.gain, side)["x"] == pytest.approx(rmse, rel=1e-9)
+
+
+def test_the_profile_of_a_parameter_is_lowest_at_its_value(friction):
+    profile = friction.causes[0].profiles[0]
+    assert min(profile.deviance) == 0.0
+    assert profile.values[profile.deviance.index(0.0)] == pytest.approx(friction.causes[0].parameters[0].value)
+    assert profile.deviance[0] > 3.84 and profile.deviance[-1] > 3.84
+
+
+def test_the_same_seed_gives_the_same_answer():
+    first, second = (diagnose(hide("cart", {"dead_zone": 0.5}, seed=2)).to_json() for _ in range(2))
+    assert first | {"seconds": 0} == second | {"seconds": 0}
+
+
+def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1, 1, (150, 2)), 6, axis=0)  # [900, 2]
+    y = np.zeros((900, 2))
+    for k in range(899):
+        pushed = np.clip(u[k, 0], -0.4, 0.4) + 0.5 * u[k, 1]
+        y[k + 1] = 0.9 * y[k] + 0.1 * np.array([pushed, -2 * pushed])
+    y += 0.01 * rng.standard_normal(y.shape)
+    channels = Channels(
+        (Channel("valve", "V"), Channel("fan", "V")),
+        (Channel("left", "m/s", "velocity"), Channel("right", "m/s", "velocity")),
+    )
+    record = Experiment("long", u, y, 0.1)
+    dataset = Dataset("two", TrainingSet((record[:500],), (record[500:700],), 10, channels), (record[700:],), 10, channels)
+    diagnosis = diagnose(dataset)
+    assert {(cause.effect, cause.channel) for cause in diagnosis.causes} == {("input_saturation", "valve")}
+
+
+@pytest.mark.parametrize("effect", ["dead_zone", "coulomb_friction"])
+def test_the_diagnosis_examples_of_the_command_line_are_solved(measured, effect):
+    truth = json.loads((measured / "diagnosis_examples" / "truth.json").read_text())
+    for name, known in truth.items():
+        if effect in known["effects"]:
+            assert [c.effect for c in diagnose(str(measured / "diagnosis_examples" / name)).causes] == known["effects"]
+
+
+def test_every_effect_can_be_hidden_somewhere():
+    everywhere = {effect for rig in ("cart", "stage", "slide", "tank", "tanks") for effect in suitable(rig)}
+    assert everywhere == set(simgap.EFFECTS.names())
