@@ -140,7 +140,16 @@ def run_plant(
                             total += g0[i, j] * force[j] + g1[i, j] * change
                     new[i] = total
                 if hold > 0.0:
-                    impulse = min(max(-new[fast] / (g0[fast, entry] + 1e-300), -hold), hold)
+                    gain = g0[fast, entry] + 1e-300
+                    impulse = min(max(-new[fast] / gain, -hold), hold)
+                    v = abs(z[fast])
+                    side = 1.0 if z[fast] > 0.0 else -1.0
+                    braking = v - side * new[fast]  # what the rest does to the speed in this step
+                    if 0.0 < v < braking + gain * hold:
+                        # It comes to rest within the step, and sticks, or turns back for what is left of it.
+                        left = 1.0 - v / (braking + gain * hold)
+                        back = max(braking - gain * hold, 0.0) * left
+                        impulse = (-side * back - new[fast]) / gain
                     for i in range(n):
                         new[i] += g0[i, entry] * impulse
                 for q in range(n_terms):
