@@ -39,7 +39,7 @@ class AbsoluteSensor(OutputEffect):
     def suits(self, scene: Scene) -> bool:
         """Where no reading is below zero but for noise, though the input takes both signs."""
         return (
-            scene.y_low > -0.15 * scene.y_high and scene.u_low < -0.2 * scene.u_max and scene.u_high > 0.2 * scene.u_max
+            scene.y_low > -0.4 * scene.y_high and scene.u_low < -0.2 * scene.u_max and scene.u_high > 0.2 * scene.u_max
         )
 
     @staticmethod
