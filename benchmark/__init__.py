@@ -6,8 +6,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simgap.diagnosis.diagnose import diagnose
     from simgap.data import Missing, describe, fetch, load, save
+    from simgap.diagnosis.diagnose import diagnose
     from simgap.fitting import Fit, fit
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput

@@ -31,7 +31,7 @@ def _multiply(a, b, product):
 
 
 @njit(types.void(_matrix, types.float64, _matrix, _matrix, _matrix), cache=True, nogil=True)
-def transition(a, h, e, g0, g1):
+def transition(a, h, e, g0, g1):  # noqa: PLR0912
     """Fill exp(A h), integral of exp(A s), and integral of exp(A (h - s)) s / h, over s from 0 to h.
 
     Taylor series with scaling and doubling: for phi_1(A h) h and phi_2(A h) h (Hochbruck and Ostermann 2010, 2.10).
@@ -84,7 +84,7 @@ def transition(a, h, e, g0, g1):
     ),
     cache=True, nogil=True,
 )  # fmt: skip
-def run_plant(
+def run_plant(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
     es, g0s, g1s, rates, entry, fast, drive, start, substeps, h, terms, n_terms, roles, thetas, p_at, m_at, memory,
     states,
 ):  # fmt: skip

@@ -113,7 +113,7 @@ class Problem:
         return local
 
     def other_side(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
-        """Local numbers with the start, or the first reading, on the side of zero that simulates each experiment better.
+        """Local numbers with the start, or the first reading, on the side of zero that suits each experiment better.
 
         A reading without a sign does not tell the two apart, and no descent leads from one to the other.
         """

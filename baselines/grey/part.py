@@ -8,12 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from simgap.baselines.grey.leftover import Leftover, look_for_more
 from simgap.baselines.grey.least_squares import Problem
+from simgap.baselines.grey.leftover import Leftover, look_for_more
 from simgap.baselines.grey.machine import Machine
 from simgap.baselines.grey.outliers import Outliers
-from simgap.baselines.grey.search import Search, Trial, replaces
+from simgap.baselines.grey.search import Search
 from simgap.baselines.grey.structure import Term
+from simgap.baselines.grey.trial import Trial, replaces
 from simgap.records import Channels
 from simgap.registry import EFFECTS
 
@@ -130,7 +131,12 @@ class Part:
         others = []
         for trial in trials:
             new = [t for t in trial.terms if t not in without.terms]
-            if new and not replaces(new[0], term) and new[0].effect.name != term.effect.name and self.search.significant(without, trial):
+            if (
+                new
+                and not replaces(new[0], term)
+                and new[0].effect.name != term.effect.name
+                and self.search.significant(without, trial)
+            ):
                 gain = 1 - trial.blocks.sum() / max(without.blocks.sum(), 1e-300)
                 others.append(Rival(new[0].effect.name, float(gain), self.found.score - trial.score))
         return others

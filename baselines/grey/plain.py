@@ -92,7 +92,6 @@ def extended(structure: Structure, records: Records, smaller: Estimate) -> Itera
         yield before
     elif structure.cascade:
         yield from (sorted([*before, rate], reverse=True) for rate in rates)
-        yield from (sorted(before, reverse=True)[:-1] + [before[-1], 1.5 * before[-1]] for _ in range(1))
     elif len(before) % 2 == 0:
         yield from ([*before, rate] for rate in rates)
     else:

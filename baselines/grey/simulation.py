@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from simgap.effects.effect import InputEffect, OutputEffect
 ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3}
 
 
-@lru_cache(maxsize=None)
+@cache
 def compiled(term: Any) -> Any:
     """A force term for the inner loop."""
     return cfunc(TERM, cache=True)(inspect.unwrap(term))

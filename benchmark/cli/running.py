@@ -43,7 +43,8 @@ def run(
     if suite == "hide-and-seek":
         from simgap.cli import seeking
 
-        return seeking.run(jobs, out, seeds, names(datasets), json)
+        seeking.run(jobs, out, seeds, names(datasets), json)
+        return
     from rich.console import Console
 
     from simgap import runner, store

@@ -37,8 +37,8 @@ def diagnose(
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
     `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the intervals and
-    of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it; without
-    `views_too` the views of the error are left out.
+    of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it;
+    without `views_too` the views of the error are left out.
     Raises UnusableInput.
     """
     from simgap.data import load

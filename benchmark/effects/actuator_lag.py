@@ -38,9 +38,11 @@ class ActuatorLag(InputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
     twins: ClassVar[dict[str, str]] = {
-        "input_delay": "apply a step and sample fast: a lag starts at once, after a delay nothing moves at first; a short hold "
+        "input_delay": "apply a step and sample fast: a lag starts at once, after a delay nothing moves at first; "
+        "a short hold "
         "of the input excites the high frequencies that tell them apart",
-        "sensor_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a machine that "
+        "sensor_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a "
+        "machine that "
         "is otherwise linear: they are the same transfer function",
         "backlash": "repeat a slow triangle at half the speed: a lag fades, play stays as wide",
     }

@@ -18,15 +18,18 @@ class AsymmetricGain(InputEffect):
     name: ClassVar[str] = "asymmetric_gain"
     title: ClassVar[str] = "gain that differs with direction"
     explanation: ClassVar[str] = (
-        "The machine answers more strongly one way than the other: unequal areas of a cylinder, unequal halves of a power "
+        "The machine answers more strongly one way than the other: unequal areas of a cylinder, unequal halves of "
+        "a power "
         "stage, a single-acting brake."
     )
     reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
     shows_in: ClassVar[tuple[str, ...]] = ("input", "sign of velocity")
     twins: ClassVar[dict[str, str]] = {
-        "constant_load": "let it run without input: a load still moves it; and compare steps up and down of several sizes: "
+        "constant_load": "let it run without input: a load still moves it; and compare steps up and down of "
+        "several sizes: "
         "an unequal gain errs in proportion to the step, a load by the same amount",
-        "quadratic_stiffness": "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines",
+        "quadratic_stiffness": "hold constant inputs of several sizes both ways: an unequal gain gives two "
+        "straight lines",
         "sensor_bias": "record at rest without input: a bias is still there",
     }
 

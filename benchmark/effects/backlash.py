@@ -26,8 +26,10 @@ class Backlash(InputEffect):
     )
     shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "input")
     twins: ClassVar[dict[str, str]] = {
-        "hysteresis": "trace slow loops of several sizes: play has straight flanks and a flat top, hysteresis is rounded",
-        "input_delay": "repeat a slow triangle at half the speed: a delay keeps its seconds, play keeps its width in units of "
+        "hysteresis": "trace slow loops of several sizes: play has straight flanks and a flat top, hysteresis is "
+        "rounded",
+        "input_delay": "repeat a slow triangle at half the speed: a delay keeps its seconds, play keeps its width "
+        "in units of "
         "the input",
         "actuator_lag": "repeat a slow triangle at half the speed: a lag fades, play stays as wide",
         "coulomb_friction": "stop and start in the same direction: play shows only after a reversal",

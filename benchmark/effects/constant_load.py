@@ -22,7 +22,8 @@ class ConstantLoad(ForceEffect):
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("position", "time")
     twins: ClassVar[dict[str, str]] = {
-        "asymmetric_gain": "let it run without input, and compare steps up and down of several sizes: a load errs by the same amount each time",
+        "asymmetric_gain": "let it run without input, and compare steps up and down of several sizes: a load errs "
+        "by the same amount each time",
         "sensor_bias": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
         "quadratic_stiffness": "hold it at several positions: a load is the same at all of them",
         "sensor_drift": "record for longer: a drift goes on growing",

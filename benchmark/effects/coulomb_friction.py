@@ -16,16 +16,20 @@ class CoulombFriction(ForceEffect):
     name: ClassVar[str] = "coulomb_friction"
     title: ClassVar[str] = "Coulomb friction"
     explanation: ClassVar[str] = (
-        "Dry friction: a force of constant size against the motion, which also holds the machine where it stands until the drive exceeds it."
+        "Dry friction: a force of constant size against the motion, which also holds the machine where it stands "
+        "until the drive exceeds it."
     )
     reference: ClassVar[str] = (
-        "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models ... for the control of machines with friction, Automatica 30, 1994"
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models ... for the control of machines with "
+        "friction, Automatica 30, 1994"
     )
     role: ClassVar[Role] = "friction"
     shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "velocity", "time since reversal")
     twins: ClassVar[dict[str, str]] = {
-        "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts to move",
-        "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead zone takes its share of the input only near zero",
+        "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts "
+        "to move",
+        "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead "
+        "zone takes its share of the input only near zero",
         "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
         "quadratic_drag": "run at two constant speeds, one twice the other: dry friction costs the same at both",
         "backlash": "stop and start again in the same direction: friction sticks, play is already taken up",

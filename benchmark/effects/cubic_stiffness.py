@@ -16,14 +16,16 @@ class CubicStiffness(ForceEffect):
     name: ClassVar[str] = "cubic_stiffness"
     title: ClassVar[str] = "cubic stiffness"
     explanation: ClassVar[str] = (
-        "A spring that gets stiffer (or softer) the further it is stretched, both ways: a clamped beam, rubber near its limit, a membrane."
+        "A spring that gets stiffer (or softer) the further it is stretched, both ways: a clamped beam, rubber "
+        "near its limit, a membrane."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
     twins: ClassVar[dict[str, str]] = {
         "position_torque": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
-        "input_saturation": "hold constant inputs up to the largest: saturation ends the growth at one value of the input",
+        "input_saturation": "hold constant inputs up to the largest: saturation ends the growth at one value of "
+        "the input",
         "quadratic_drag": "hold it at rest away from the middle: a spring still pulls, drag does not",
     }
 

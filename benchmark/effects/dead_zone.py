@@ -26,10 +26,12 @@ class DeadZone(InputEffect):
     )
     shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
     twins: ClassVar[dict[str, str]] = {
-        "coulomb_friction": "drive it at constant speed with slowly rising input in one direction only: friction keeps its "
+        "coulomb_friction": "drive it at constant speed with slowly rising input in one direction only: friction "
+        "keeps its "
         "force while it moves, a dead zone acts on the input alone; then brake without input and watch the stop",
         "backlash": "reverse the input slowly with large and small strokes: play shows only after a reversal",
-        "quadratic_drag": "hold several constant inputs: the steady output over the input is a kinked line for a dead zone",
+        "quadratic_drag": "hold several constant inputs: the steady output over the input is a kinked line for a "
+        "dead zone",
     }
 
     def parameters(self, scene: Scene) -> tuple[Parameter, ...]:

@@ -18,7 +18,8 @@ class GainFade(InputEffect):
     name: ClassVar[str] = "gain_fade"
     title: ClassVar[str] = "gain that fades with time"
     explanation: ClassVar[str] = (
-        "The same input does less and less in the course of each experiment: a sagging battery, a winding that warms up, "
+        "The same input does less and less in the course of each experiment: a sagging battery, a winding that "
+        "warms up, "
         "oil that changes with temperature."
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"

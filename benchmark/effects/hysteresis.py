@@ -17,7 +17,8 @@ class Hysteresis(ForceEffect):
     name: ClassVar[str] = "hysteresis"
     title: ClassVar[str] = "hysteresis"
     explanation: ClassVar[str] = (
-        "A force that depends on the way it came: it builds up over a certain travel after each reversal and then stays, at any speed. Creeping seals, wire ropes, piezo stacks, presliding friction."
+        "A force that depends on the way it came: it builds up over a certain travel after each reversal and then "
+        "stays, at any speed. Creeping seals, wire ropes, piezo stacks, presliding friction."
     )
     reference: ClassVar[str] = "Bouc 1967, Wen 1976; Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
     role: ClassVar[Role] = "force"

@@ -18,12 +18,14 @@ class InputDelay(InputEffect):
     name: ClassVar[str] = "input_delay"
     title: ClassVar[str] = "delay of the input"
     explanation: ClassVar[str] = (
-        "The input arrives unchanged but late: transport in a pipe or on a belt, a bus, a computation that takes a cycle."
+        "The input arrives unchanged but late: transport in a pipe or on a belt, a bus, a computation that takes a "
+        "cycle."
     )
     reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
     twins: ClassVar[dict[str, str]] = {
-        "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; a short "
+        "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; "
+        "a short "
         "hold of the input excites the high frequencies that tell them apart",
         "sensor_lag": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
     }

@@ -23,10 +23,12 @@ class InputSaturation(InputEffect):
     reference: ClassVar[str] = "Hippe, Windup in Control, 2006, ch. 1"
     shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
     twins: ClassVar[dict[str, str]] = {
-        "quadratic_drag": "hold constant inputs up to the largest: with saturation the steady output stops growing at once, "
+        "quadratic_drag": "hold constant inputs up to the largest: with saturation the steady output stops growing "
+        "at once, "
         "with drag it bends",
         "sensor_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "cubic_stiffness": "hold constant inputs up to the largest: saturation ends the growth at one value of the input",
+        "cubic_stiffness": "hold constant inputs up to the largest: saturation ends the growth at one value of the "
+        "input",
     }
 
     def parameters(self, scene: Scene) -> tuple[Parameter, ...]:

@@ -16,7 +16,8 @@ class Overflow(ForceEffect):
     name: ClassVar[str] = "overflow"
     title: ClassVar[str] = "overflow"
     explanation: ClassVar[str] = (
-        "A level cannot rise above the rim: the rest spills over, into the next tank or out of the plant, and as soon as less "
+        "A level cannot rise above the rim: the rest spills over, into the next tank or out of the plant, and as "
+        "soon as less "
         "comes in the level falls again."
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
@@ -24,10 +25,12 @@ class Overflow(ForceEffect):
     reshapes: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
     twins: ClassVar[dict[str, str]] = {
-        "sensor_saturation": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor only when "
+        "sensor_saturation": "watch how it comes back from the limit: an overflow leaves it at once, a saturated "
+        "sensor only when "
         "the level is back in range",
         "sqrt_outflow": "fill it slowly past the largest level: only an overflow stops the rise",
-        "input_saturation": "raise the largest input step by step: an overflow stops the level, however slowly it is filled",
+        "input_saturation": "raise the largest input step by step: an overflow stops the level, however slowly it "
+        "is filled",
     }
 
     def parameters(self, scene: Scene) -> tuple[Parameter, ...]:

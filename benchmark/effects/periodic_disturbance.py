@@ -17,7 +17,8 @@ class PeriodicDisturbance(ForceEffect):
     name: ClassVar[str] = "periodic_disturbance"
     title: ClassVar[str] = "periodic disturbance"
     explanation: ClassVar[str] = (
-        "A force of one frequency that has nothing to do with the input: an unbalanced rotor nearby, mains hum, a pump's pulsation."
+        "A force of one frequency that has nothing to do with the input: an unbalanced rotor nearby, mains hum, a "
+        "pump's pulsation."
     )
     reference: ClassVar[str] = (
         "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"

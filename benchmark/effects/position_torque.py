@@ -17,10 +17,12 @@ class PositionTorque(ForceEffect):
     name: ClassVar[str] = "position_torque"
     title: ClassVar[str] = "torque that depends on position"
     explanation: ClassVar[str] = (
-        "A force that goes up and down over the travel, whatever the time: cogging of a motor's magnets, a cable or hose that pulls, an eccentric mass."
+        "A force that goes up and down over the travel, whatever the time: cogging of a motor's magnets, a cable "
+        "or hose that pulls, an eccentric mass."
     )
     reference: ClassVar[str] = (
-        "Proca et al., Analytical model for permanent magnet motors with surface mounted magnets, IEEE Trans. Energy Conversion 18, 2003"
+        "Proca et al., Analytical model for permanent magnet motors with surface mounted magnets, IEEE Trans. "
+        "Energy Conversion 18, 2003"
     )
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("position",)

@@ -16,15 +16,18 @@ class QuadraticDrag(ForceEffect):
     name: ClassVar[str] = "quadratic_drag"
     title: ClassVar[str] = "quadratic drag"
     explanation: ClassVar[str] = (
-        "A force against the motion that grows with the square of the velocity: air or water around the body, oil through an orifice."
+        "A force against the motion that grows with the square of the velocity: air or water around the body, oil "
+        "through an orifice."
     )
     reference: ClassVar[str] = "Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, ch. 6"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("velocity", "amplitude")
     twins: ClassVar[dict[str, str]] = {
         "coulomb_friction": "run at two constant speeds, one twice the other: drag costs four times as much",
-        "input_saturation": "hold constant inputs up to the largest: with drag the steady speed bends, with saturation it stops growing at once",
-        "dead_zone": "hold several constant inputs: the steady output over the input is curved for drag, kinked for a dead zone",
+        "input_saturation": "hold constant inputs up to the largest: with drag the steady speed bends, with "
+        "saturation it stops growing at once",
+        "dead_zone": "hold several constant inputs: the steady output over the input is curved for drag, kinked "
+        "for a dead zone",
     }
 
     def parameters(self, scene: Scene) -> tuple[Parameter, ...]:

@@ -16,7 +16,8 @@ class QuadraticStiffness(ForceEffect):
     name: ClassVar[str] = "quadratic_stiffness"
     title: ClassVar[str] = "quadratic stiffness"
     explanation: ClassVar[str] = (
-        "A spring that pulls harder on one side than on the other: a preloaded or one-sided suspension, a magnet's pull."
+        "A spring that pulls harder on one side than on the other: a preloaded or one-sided suspension, a magnet's "
+        "pull."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"

@@ -18,7 +18,8 @@ class SensorBias(OutputEffect):
     name: ClassVar[str] = "sensor_bias"
     title: ClassVar[str] = "sensor bias"
     explanation: ClassVar[str] = (
-        "The reading is off by a constant that differs from experiment to experiment: a zero that is not set, an encoder switched on anywhere."
+        "The reading is off by a constant that differs from experiment to experiment: a zero that is not set, an "
+        "encoder switched on anywhere."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     shows_in: ClassVar[tuple[str, ...]] = ("experiment",)

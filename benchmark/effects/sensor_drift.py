@@ -18,7 +18,8 @@ class SensorDrift(OutputEffect):
     name: ClassVar[str] = "sensor_drift"
     title: ClassVar[str] = "sensor drift"
     explanation: ClassVar[str] = (
-        "The reading wanders off steadily while the machine does not: an integrated gyro, a warming amplifier, a creeping load cell."
+        "The reading wanders off steadily while the machine does not: an integrated gyro, a warming amplifier, a "
+        "creeping load cell."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     shows_in: ClassVar[tuple[str, ...]] = ("time", "first against second half")

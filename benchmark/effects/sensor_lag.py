@@ -24,7 +24,8 @@ class SensorLag(OutputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
     twins: ClassVar[dict[str, str]] = {
-        "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a machine that is otherwise linear: they are the same transfer function",
+        "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in "
+        "a machine that is otherwise linear: they are the same transfer function",
         "input_delay": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
     }
 

@@ -22,7 +22,8 @@ class SensorSaturation(OutputEffect):
     shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
     twins: ClassVar[dict[str, str]] = {
         "input_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "overflow": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor only when the level is back in range",
+        "overflow": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor "
+        "only when the level is back in range",
         "absolute_sensor": "move slowly through zero",
     }
 

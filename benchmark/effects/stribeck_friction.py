@@ -17,14 +17,17 @@ class StribeckFriction(ForceEffect):
     name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"
     explanation: ClassVar[str] = (
-        "Dry friction that is larger at standstill and falls within a small velocity, because a film of lubricant builds up: it breaks away with a jerk and creeps badly."
+        "Dry friction that is larger at standstill and falls within a small velocity, because a film of lubricant "
+        "builds up: it breaks away with a jerk and creeps badly."
     )
     reference: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, sec. 2"
     role: ClassVar[Role] = "friction"
     shows_in: ClassVar[tuple[str, ...]] = ("velocity", "sign of velocity")
     twins: ClassVar[dict[str, str]] = {
-        "coulomb_friction": "creep through zero very slowly: with Coulomb friction alone the force does not fall as it starts to move",
-        "dead_zone": "drive it at constant speed and change the input a little: a dead zone acts around zero input only",
+        "coulomb_friction": "creep through zero very slowly: with Coulomb friction alone the force does not fall "
+        "as it starts to move",
+        "dead_zone": "drive it at constant speed and change the input a little: a dead zone acts around zero input "
+        "only",
         "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
     }
 

@@ -136,7 +136,9 @@ def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():
         (Channel("left", "m/s", "velocity"), Channel("right", "m/s", "velocity")),
     )
     record = Experiment("long", u, y, 0.1)
-    dataset = Dataset("two", TrainingSet((record[:500],), (record[500:700],), 10, channels), (record[700:],), 10, channels)
+    dataset = Dataset(
+        "two", TrainingSet((record[:500],), (record[500:700],), 10, channels), (record[700:],), 10, channels
+    )
     diagnosis = diagnose(dataset)
     assert {(cause.effect, cause.channel) for cause in diagnosis.causes} == {("input_saturation", "valve")}
 

@@ -81,7 +81,7 @@ LAST = {"sensor_saturation"}
 
 @pytest.mark.parametrize(
     ("rig", "effect"),
-    [(rig, effect) for rig in ("cart", "stage") for effect in suitable(rig) if effect not in ("outliers", "quantisation")]
+    [(rig, name) for rig in ("cart", "stage") for name in suitable(rig) if name not in ("outliers", "quantisation")]
     + [("tank", "sqrt_outflow"), ("tank", "overflow"), ("tank", "dead_zone"), ("tanks", "sqrt_outflow")],
 )  # fmt: skip
 def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
