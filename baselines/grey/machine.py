@@ -74,6 +74,25 @@ class Machine:
         fixed = np.ones(len(self.estimate.theta), dtype=bool)
         return problem.fit(self.estimate.theta, fixed=fixed, max_steps=15).local
 
+    def shares(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T e"]:
+        """What each effect does to the first output: the simulation less the one without it, from the same start."""
+        structure, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
+        if not structure.terms:
+            return np.zeros((*u.shape[:2], 0))
+        start = self.start(structure, u[:, :n], y_init)
+        whole = Simulator(structure, u).run(theta, start)
+        shares = []
+        for term in structure.terms:
+            rest = structure.having([other for other in structure.terms if other != term])
+            of_rest = np.zeros(rest.size)
+            of_rest[: rest.n_plant] = theta[: rest.n_plant]
+            for other in rest.terms:
+                of_rest[rest.term_at(other)] = theta[structure.term_at(other)]
+            shares.append(whole[:, :, 0] - Simulator(rest, u).run(of_rest, start)[:, :, 0])
+        return np.stack(shares, axis=2)
+
     def again(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Rows n_init .. T-1 of a free run in which what belongs to this experiment is estimated from all of it."""
         structure, outputs = self.estimate.structure, list(self.outputs)
