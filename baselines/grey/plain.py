@@ -11,7 +11,7 @@ from simgap.baselines.grey.least_squares import Estimate, Problem, Records
 from simgap.baselines.grey.noise import white
 from simgap.baselines.grey.structure import Structure
 
-FINALISTS = 3
+FINALISTS = 2
 
 
 def fit_plain(structure: Structure, records: Records, smaller: Estimate | None = None) -> Estimate:

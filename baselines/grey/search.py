@@ -105,7 +105,7 @@ class Search:
             return cls(records, held_out, channels, tuple(outputs), structure, plain, cut, off)
 
         search = started(tried[-1])
-        for simpler in tried[:-1]:
+        for simpler in (fit for fit in tried[:-1] if not fit.structure.zeros):
             # A higher order is no answer where a delay, which costs no more, does as well.
             other = started(simpler)
             if other.held_out_error(other.add(other.plain, DELAY)) <= search.held_out_error(search.plain):
