@@ -29,7 +29,8 @@ ALLOWED = {
     "store": {"records"},
     "workers": set(),
     "suites": CONTRACTS | {"tasks", "store"},
-    "diagnosis": CONTRACTS | BENCH | {"findings", "data", "effects"},
+    # An answer shows itself in a notebook.
+    "diagnosis": CONTRACTS | BENCH | {"findings", "data", "effects", "reports"},
     "cli": EVERYTHING,
     "simgap": EVERYTHING,
 }
