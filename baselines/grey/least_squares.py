@@ -219,7 +219,7 @@ class Problem:
             else:
                 converged = True
                 break
-            crawls = squares - trial_squares < 1e-9 * squares
+            crawls = squares - trial_squares < 1e-6 * tolerance * squares
             theta, local, errors, squares = trial, trial_local, trial_errors, trial_squares
             damping = max(damping / 10, 1e-12)
             if crawls:

@@ -69,10 +69,15 @@ class Machine:
 
     def start(self, structure: Structure, u: np.ndarray, y: np.ndarray) -> Float[np.ndarray, "B q"]:
         """Local numbers at the first of the measured samples, by least squares on all of them."""
-        records = Records(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), structure.dt)
-        problem = Problem(structure, records, self.noise)
         fixed = np.ones(len(self.estimate.theta), dtype=bool)
-        return problem.fit(self.estimate.theta, fixed=fixed, max_steps=15).local
+
+        def of_one(i: int) -> np.ndarray:  # alone, because the damping of a fit is common to its records
+            seen = np.ones((1, y.shape[1]), dtype=bool)
+            records = Records(np.ascontiguousarray(u[i : i + 1]), y[i : i + 1], seen, structure.dt)
+            problem = Problem(structure, records, self.noise)
+            return problem.fit(self.estimate.theta, fixed=fixed, max_steps=15).local
+
+        return np.concatenate([of_one(i) for i in range(len(u))])
 
     def shares(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]

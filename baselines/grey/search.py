@@ -106,13 +106,18 @@ class Search:
 
         search = started(tried[-1])
         for simpler in (fit for fit in tried[:-1] if not fit.structure.zeros):
-            # A higher order is no answer where a delay, which costs no more, does as well.
+            # A higher order is no answer where a delay or another law of the plant, which cost no more, do as well.
             other = started(simpler)
-            if other.held_out_error(other.add(other.plain, DELAY)) <= search.held_out_error(search.plain):
+            if any(other.held_out_error(other.add(other.plain, term)) <= search.held_out_error(search.plain)
+                   for term in (DELAY, *other.laws())):  # fmt: skip
                 search = other
                 break
         smooth = let_run_on(search.plain, records, held_out)
         return search if smooth is None else started(smooth)
+
+    def laws(self) -> list[Term]:
+        """The effects that change the law of the plant itself, such as an outflow that is not linear in the level."""
+        return [term for term in self.candidates(()) if term.effect.reshapes and term.effect.port == "force"]
 
     def held_out_error(self, fit: Estimate) -> float:
         """Mean square of held-out simulations."""

@@ -118,7 +118,8 @@ class Simulator:
     ) -> Float[np.ndarray, "E T ny"]:
         """The readings of the sensors."""
         structure = self.structure
-        y = states @ structure.reading(theta).T
+        with np.errstate(over="ignore", invalid="ignore"):
+            y = states @ structure.reading(theta).T
         for channel in range(structure.ny):
             for term in structure.on("output", channel):
                 if term in structure.local:
