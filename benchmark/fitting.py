@@ -20,7 +20,7 @@ from simgap.provenance import provenance
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.store import plain
-from simgap.tasks import TASKS, Task, Trial
+from simgap.tasks import TASKS, USUAL, Task, Trial
 from simgap.workers import threads_per_worker
 
 
@@ -60,7 +60,7 @@ def fit(
         provenance=provenance(threads_per_worker(1)) | {"data_sha256": dataset.sha256},
     )  # fmt: skip
     about = fit_model(built, dataset.training, about)
-    return Fit(built, score_model(built, dataset, [task() for task in TASKS.values()], about))
+    return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
 
 
 def model_class(reference: str) -> type:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -32,3 +33,17 @@ class Model(Protocol):
         forecast is many short ones.
         """
         ...
+
+
+_listeners: list[Callable[[int, int], None]] = []
+
+
+def progress(done: int, total: int) -> None:
+    """A model whose fit takes long may say how far it is, in steps of its own such as epochs."""
+    for listener in _listeners:
+        listener(done, total)
+
+
+def listen(listener: Callable[[int, int], None]) -> None:
+    """Have `listener(done, total)` called whenever a model of this process says how far it is."""
+    _listeners.append(listener)

@@ -48,6 +48,13 @@ class Registry:
 
         return add
 
+    def name_of(self, target: Any) -> str:
+        """The name under which `target` was registered. Raises UnusableInput."""
+        for name, found in self._found.items():
+            if found is target:
+                return name
+        raise UnusableInput(f"{target!r} is no registered {self.kind}")
+
     def names(self) -> list[str]:
         """All names, those of importable and of broken modules alike, in alphabetical order."""
         return sorted({*self._index(), *self._found, *self._plugins()})

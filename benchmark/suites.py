@@ -10,7 +10,7 @@ from typing import Any
 
 from simgap.records import UnusableInput
 from simgap.registry import DATASETS, MODELS
-from simgap.tasks import TASKS
+from simgap.tasks import TASKS, USUAL
 
 FOLDER = Path(__file__).parent / "suites"
 
@@ -36,7 +36,7 @@ class Suite:
     title: str
     datasets: tuple[str, ...]
     models: tuple[Entry, ...]
-    tasks: tuple[str, ...] = tuple(TASKS)
+    tasks: tuple[str, ...] = USUAL
     seeds: int = 1
     timeout: float = 3600.0
 
@@ -74,7 +74,7 @@ class _Reader:
             title=self._get("title", str, self.path.stem),
             datasets=self._datasets(),
             models=tuple(self._models()),
-            tasks=tuple(str(task) for task in self._get("tasks", list, list(TASKS))),
+            tasks=tuple(str(task) for task in self._get("tasks", list, list(USUAL))),
             seeds=self._get("seeds", int, 1),
             timeout=float(self._get("timeout", (int, float), 3600)),
         )

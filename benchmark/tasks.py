@@ -67,6 +67,20 @@ class FreeRun(Task):
 
 
 @dataclass(frozen=True)
+class Differences(Task):
+    """The free run again, scored on its differences from sample to sample (the paper's "delta" set, section 3.8)."""
+
+    name: ClassVar[str] = "differences"
+
+    def score(self, trial: Trial) -> Outcome:
+        """Score y(k) - y(k-1) for rows n_init .. T-1; the first one starts at the last measured sample."""
+        start = trial.experiment.y[trial.n_init - 1 : trial.n_init]
+        y = np.diff(trial.experiment.y[trial.n_init - 1 :], axis=0)
+        y_hat = np.diff(np.concatenate((start, trial.free_run)), axis=0)
+        return Outcome(score_outputs(y, y_hat, trial.channels), is_finite(y_hat))
+
+
+@dataclass(frozen=True)
 class Forecast(Task):
     """Forecasts of up to max(horizons) samples, each started from n_init measured outputs of its own.
 
@@ -107,4 +121,5 @@ class Forecast(Task):
         return np.unique(np.linspace(0, last, min(self.windows, last + 1)).round().astype(int))
 
 
-TASKS: dict[str, type[Task]] = {task.name: task for task in (FreeRun, Forecast)}
+TASKS: dict[str, type[Task]] = {task.name: task for task in (FreeRun, Forecast, Differences)}
+USUAL = (FreeRun.name, Forecast.name)  # what a suite asks for unless it says otherwise

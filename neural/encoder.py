@@ -1,0 +1,24 @@
+"""Model 8 of the paper: LSTMs of shrinking width."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from simgap.neural.training.blocks import Block, Headed, Recurrences
+from simgap.neural.training.network import Network
+from simgap.neural.training.recurrent import Lstm, recurrent
+from simgap.registry import MODELS
+
+
+@MODELS.register("encoder")
+@dataclass
+class Encoder(Network):
+    """LSTM(first) - LSTM(second) - FC(ny), encoder-like; model 8 of the paper, which gives no widths: 32 and 16 here."""
+
+    first: int = 32
+    second: int = 16
+
+    def net(self, inputs: int, outputs: int) -> Block:
+        """An untrained network with random weights."""
+        layers = (recurrent(Lstm, inputs, self.first), recurrent(Lstm, self.first, self.second))
+        return Headed(Recurrences(layers), self.second, outputs)

@@ -1,0 +1,22 @@
+"""Model 3 of the paper: long short-term memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from simgap.neural.training.blocks import Block, Headed, Recurrences
+from simgap.neural.training.network import Network
+from simgap.neural.training.recurrent import Lstm, recurrent
+from simgap.registry import MODELS
+
+
+@MODELS.register("lstm")
+@dataclass
+class LSTM(Network):
+    """LSTM(units) - FC(ny); model 3 of the paper, which gives no width: 32 units here."""
+
+    units: int = 32
+
+    def net(self, inputs: int, outputs: int) -> Block:
+        """An untrained network with random weights."""
+        return Headed(Recurrences([recurrent(Lstm, inputs, self.units)]), self.units, outputs)

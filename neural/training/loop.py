@@ -1,0 +1,204 @@
+"""Training by the paper's protocol (section 3.5), which carries on where it was interrupted."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Protocol
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from simgap.neural.training.blocks import Block
+from simgap.neural.training.checkpoints import Checkpoint
+
+# Windows or pieces whose error is computed at once.
+AT_ONCE = 512
+
+
+class NotANumber(ArithmeticError):
+    """The loss grew beyond all bounds."""
+
+
+class Examples(Protocol):
+    """What a network is trained on."""
+
+    def __len__(self) -> int: ...
+
+    def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Tensor, Tensor]:
+        """Features and targets."""
+        ...
+
+    def answer(self, net: Block, x: Tensor) -> Tensor:
+        """What the network says to the features."""
+        ...
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Adam (Kingma and Ba 2015) on the MSE; learning rate halved on a plateau of the training loss; early stop.
+
+    patience: epochs without a better training loss before the rate is halved; early_stop: epochs without a better
+    validation loss before training ends; the weights of the best validation loss are kept. l2 is the coefficient of
+    the squared weights of recurrent and convolutional layers that is added to the loss.
+    """
+
+    epochs: int
+    batch: int
+    learning_rate: float
+    patience: int
+    early_stop: int
+    l2: float = 0.0
+    improvement: float = 1e-4  # of the training loss that counts; Keras' default
+    batches: int = 0  # per epoch; 0 for all examples
+
+
+@dataclass
+class History:
+    """What happened, epoch by epoch; losses on scaled data, the training loss a mean over the epoch, as in Keras."""
+
+    train: list[float] = field(default_factory=list)
+    valid: list[float] = field(default_factory=list)
+    rate: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def best(self) -> int:
+        """Number of the epoch with the lowest validation loss, from 1."""
+        return 1 + self.valid.index(min(self.valid))
+
+
+def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
+    """Adam, whose weight decay is 2 l2: the gradient of l2 w^2."""
+    punished = [
+        p for m in net.modules() if isinstance(m, nn.RNNBase | nn.Conv1d) for name, p in m.named_parameters()
+        if not name.startswith("weight_hh")
+    ]  # fmt: skip
+    chosen = {id(p) for p in punished}
+    rest = [p for p in net.parameters() if id(p) not in chosen]
+    groups = [{"params": punished, "weight_decay": 2 * recipe.l2}, {"params": rest}]
+    return torch.optim.Adam([g for g in groups if g["params"]], lr=recipe.learning_rate, fused=True)
+
+
+def train(
+    net: Block, examples: Examples, held_out: Examples, recipe: Recipe, seed: int, device: str = "cpu",
+    checkpoint: Path | None = None, tell: Callable[[int, History], None] = lambda epoch, history: None,
+) -> History:  # fmt: skip
+    """Train in place; afterwards the network has the weights of its best epoch. Raises NotANumber."""
+    net.to(device)
+    adam = optimiser(net, recipe)
+    order = torch.Generator().manual_seed(seed)
+    history = History()
+    best = {name: value.clone() for name, value in net.state_dict().items()}
+    state = Checkpoint(checkpoint, net, adam, best, order, {f.name: getattr(history, f.name) for f in fields(history)})
+    state.restore()
+    while len(history.valid) < recipe.epochs and not _hopeless(history, recipe):
+        begin = time.perf_counter()
+        net.train()
+        total = torch.zeros((), device=device)
+        shuffled = torch.randperm(len(examples), generator=order)
+        if recipe.batches:
+            shuffled = shuffled[: recipe.batches * recipe.batch]
+        batches = shuffled.split(recipe.batch)
+        for chosen in batches:
+            x, y = (part.to(device) for part in examples.batch(chosen))
+            for p in net.parameters():
+                p.grad = None
+            loss = nn.functional.mse_loss(examples.answer(net, x), y)
+            loss.backward()
+            adam.step()
+            total += loss.detach() * len(chosen)
+        history.train.append(float(total) / len(shuffled))
+        history.valid.append(error(net, held_out, device))
+        history.rate.append(adam.param_groups[0]["lr"])
+        history.seconds.append(time.perf_counter() - begin)
+        if not math.isfinite(history.train[-1] + history.valid[-1]):
+            raise NotANumber(f"the loss is not a number after epoch {len(history.valid)}; choose a lower learning rate")
+        if history.best == len(history.valid):
+            for name, value in net.state_dict().items():
+                best[name].copy_(value)
+        if _plateau(history, recipe):
+            for group in adam.param_groups:
+                group["lr"] *= 0.5
+        state.save()
+        tell(len(history.valid), history)
+    net.load_state_dict(best)
+    net.to("cpu").eval()
+    return history
+
+
+def error(net: Block, examples: Examples, device: str = "cpu") -> float:
+    """Mean square of the errors on scaled data, without dropout."""
+    return sum(float(e.square().sum()) for e in _errors(net, examples, device)) / _numbers(net, examples)
+
+
+def figures(net: Block, examples: Examples) -> dict[str, float]:
+    """MSE, MAE and R2 on scaled data; R2 is the mean over the outputs, as in scikit-learn and Keras."""
+    errors, targets = [], []
+    for chosen in torch.arange(len(examples)).split(AT_ONCE):
+        x, y = examples.batch(chosen)
+        with torch.no_grad():
+            errors.append((examples.answer(net, x) - y).flatten(0, -2))
+        targets.append(y.flatten(0, -2))
+    e, y = torch.cat(errors).double(), torch.cat(targets).double()
+    explained = 1 - e.square().sum(0) / (y - y.mean(0)).square().sum(0).clamp(min=1e-300)
+    return {"mse": float(e.square().mean()), "mae": float(e.abs().mean()), "r2": float(explained.mean())}
+
+
+def _errors(net: Block, examples: Examples, device: str):  # noqa: ANN202
+    net.eval()
+    for chosen in torch.arange(len(examples)).split(AT_ONCE):
+        x, y = (part.to(device) for part in examples.batch(chosen))
+        with torch.no_grad():
+            yield examples.answer(net, x) - y
+
+
+def _numbers(net: Block, examples: Examples) -> int:
+    return len(examples) * examples.batch(torch.tensor([0]))[1].numel()
+
+
+def _hopeless(history: History, recipe: Recipe) -> bool:
+    return bool(history.valid) and len(history.valid) - history.best >= recipe.early_stop
+
+
+def _plateau(history: History, recipe: Recipe) -> bool:
+    """Whether the training loss has not fallen for `patience` epochs since the rate was last halved."""
+    last = history.rate[-1]
+    since = [loss for loss, rate in zip(history.train, history.rate, strict=True) if rate == last]
+    best = min(history.train[: len(history.train) - len(since)], default=math.inf)
+    waited = 0
+    for loss in since:
+        if loss < best - recipe.improvement:
+            best, waited = loss, 0
+        else:
+            waited += 1
+    return waited >= recipe.patience
+
+
+def range_test(
+    net: Block, examples: Examples, batch: int, low: float = 1e-8, high: float = 1.0, steps: int = 400, seed: int = 0
+) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
+    """The loss while the learning rate grows from batch to batch (paper, 3.4; Smith 2017): rates and losses.
+
+    Ends early when the loss is ten times the lowest one.
+    """
+    adam = optimiser(net, Recipe(1, batch, low, 1, 1))
+    order = torch.Generator().manual_seed(seed)
+    rates, losses = torch.logspace(math.log10(low), math.log10(high), steps), []
+    net.train()
+    for rate in rates:
+        for group in adam.param_groups:
+            group["lr"] = float(rate)
+        x, y = examples.batch(torch.randint(len(examples), (batch,), generator=order))
+        adam.zero_grad()
+        loss = nn.functional.mse_loss(examples.answer(net, x), y)
+        loss.backward()
+        adam.step()
+        losses.append(float(loss.detach()))
+        if not math.isfinite(losses[-1]) or losses[-1] > 10 * min(losses):
+            break
+    return rates[: len(losses)], torch.tensor(losses)

@@ -1,0 +1,195 @@
+"""What every neural model shares: it is scaled, trained, simulated and stored in one way."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import os
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from simgap.neural.training import sequences, weights, windows
+from simgap.neural.training.blocks import Block
+from simgap.neural.training.loop import Examples, History, Recipe, figures, range_test, train
+from simgap.neural.training.scaling import Scaling, features, scalings
+from simgap.protocol import progress
+from simgap.records import TrainingSet, UnusableInput
+
+STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=50)
+# Free runs of held-out data on which the best epoch is chosen: samples of each, and how many.
+HELD_OUT = (1000, 32)
+
+
+@dataclass
+class Network(ABC):
+    """A neural model; a subclass has one method, `net`.
+
+    mode "windowed" is the paper's: `window` samples of time and input in, the next outputs out, no state, no measured
+    output; Adam 1e-4, batch 32, at most `epochs` epochs, sections 3.4 and 3.5. At most `batches` batches make an epoch
+    (0: all windows). Mode "stateful": the network reads n_init measured samples and then runs free, trained on pieces
+    of experiments. device "cpu", "cuda" or "mps" trains; simulation is always in double precision on the CPU, so that
+    an experiment does not depend on those beside it. resident=False trains on windows without a copy of the data in
+    memory. log: folder for TensorBoard. Raises UnusableInput.
+    """
+
+    mode: Literal["windowed", "stateful"] = "stateful"
+    window: int = 40
+    epochs: int = 30
+    batches: int = 0
+    learning_rate: float = 0.0  # 0: 1e-4 windowed, 3e-3 stateful
+    l2: float = 0.0
+    dropout: float = 0.0
+    resident: bool = True
+    device: str = "cpu"
+    log: str = ""
+    trained: Block = field(init=False, repr=False)
+    of_x: Scaling = field(init=False, repr=False)
+    of_y: Scaling = field(init=False, repr=False)
+    dt: float = field(init=False, repr=False)
+    inputs: int = field(init=False, repr=False)
+    fitted: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    @abstractmethod
+    def net(self, inputs: int, outputs: int) -> Block:
+        """An untrained network with random weights."""
+
+    @property
+    def windowed(self) -> bool:
+        """Whether the network sees windows of inputs only."""
+        return self.mode == "windowed"
+
+    @property
+    def recipe(self) -> Recipe:
+        """How this model is trained."""
+        if self.windowed:
+            return Recipe(self.epochs, 32, self.learning_rate or 1e-4, 1, 10, self.l2, batches=self.batches)
+        return Recipe(self.epochs, STATEFUL.batch, self.learning_rate or STATEFUL.learning_rate, STATEFUL.patience,
+                      STATEFUL.early_stop, self.l2, STATEFUL.improvement, self.batches or STATEFUL.batches)  # fmt: skip
+
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        """Train; carries on from the last epoch of an interrupted run where SIMGAP_CHECKPOINTS names a folder."""
+        examples, held_out, net = self.prepare(data, seed)
+        checkpoint = self._checkpoint(data, seed)
+        writer = _Log(self.log)
+
+        def tell(epoch: int, history: History) -> None:
+            progress(epoch, self.epochs)
+            writer.write(epoch, history)
+
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            history = train(net, examples, held_out, self.recipe, seed, self.device, checkpoint, tell)
+        self.trained = net
+        self.fitted = {
+            "epochs": len(history.valid), "best_epoch": history.best, "train": figures(net, examples),
+            "valid": figures(net, held_out), "train_loss": history.train, "valid_loss": history.valid,
+            "seconds_per_epoch": float(np.median(history.seconds)), "device": self.device,
+        }  # fmt: skip
+        if checkpoint is not None:
+            checkpoint.unlink(missing_ok=True)
+
+    def prepare(self, data: TrainingSet, seed: int) -> tuple[Examples, Examples, Block]:
+        """Examples to train on and to validate on, and the untrained network."""
+        self.check()
+        self.dt = data.dt
+        nu, ny = len(data.channels.inputs), len(data.channels.outputs)
+        self.of_x, self.of_y = scalings(data.train, time=self.windowed)
+        valid = data.valid or data.train
+        if self.windowed:
+            given = (self.of_x, self.of_y, self.window, True, self.resident)
+            examples: tuple[Examples, Examples] = (windows.Windows(data.train, *given), windows.Windows(valid, *given))
+            self.inputs = 1 + nu
+        else:
+            n = data.n_init
+            examples = (
+                sequences.Sequences(data.train, self.of_x, self.of_y, n),
+                sequences.Sequences(valid, self.of_x, self.of_y, n, *HELD_OUT),
+            )
+            self.inputs = nu + ny + 1
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            net = self.net(self.inputs, ny)
+        return *examples, net
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Free run, in double precision, one experiment after the other."""
+        net = copy.deepcopy(self.trained).double()
+        with torch.no_grad():
+            return np.stack([self._one(net, *pair) for pair in zip(u, y_init, strict=True)])
+
+    def _one(self, net: Block, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
+        x = torch.from_numpy(self.of_x.inside(features(u, self.dt, self.windowed)))
+        if self.windowed:
+            y_hat = windows.simulate(net, x, len(y_init), self.window)
+        else:
+            y_hat = sequences.simulate(net, x, torch.from_numpy(self.of_y.inside(y_init)))
+        return self.of_y.outside(y_hat.numpy())
+
+    def range_test(self, data: TrainingSet, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """Learning rates and the losses while the rate grows from batch to batch (paper, 3.4)."""
+        examples, _, net = self.prepare(data, seed)
+        rates, losses = range_test(net, examples, self.recipe.batch, seed=seed)
+        return rates.numpy().astype(float), losses.numpy().astype(float)
+
+    @property
+    def n_params(self) -> int:
+        """Number of weights."""
+        return sum(p.numel() for p in self.trained.parameters())
+
+    def save(self, folder: str | Path) -> None:
+        """Write weights.safetensors and model.json; `simgap.load_model` reads them."""
+        weights.save(self, Path(folder))
+
+    def hyper_parameters(self) -> dict[str, Any]:
+        """The fields that one may choose."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+
+    def check(self) -> None:
+        """Raises UnusableInput for hyper-parameters that make no sense."""
+        if self.mode not in ("windowed", "stateful"):
+            raise UnusableInput(f"the mode {self.mode!r} is not known; it is windowed or stateful")
+        if self.window < 8 or self.epochs < 1:
+            raise UnusableInput("a network needs a window of at least 8 samples and at least one epoch")
+        if self.device != "cpu":
+            try:
+                torch.zeros(1, device=self.device)
+            except (RuntimeError, AssertionError) as error:
+                text = str(error).splitlines()[0]
+                raise UnusableInput(f"the device {self.device!r} cannot be used: {text}") from error
+
+    def _checkpoint(self, data: TrainingSet, seed: int) -> Path | None:
+        folder = os.environ.get("SIMGAP_CHECKPOINTS")
+        if not folder:
+            return None
+        told = hashlib.sha256(repr((type(self).__qualname__, self.hyper_parameters(), seed, data.n_init)).encode())
+        for x in data.train + data.valid:
+            told.update(x.u.tobytes() + x.y.tobytes())
+        return Path(folder) / f"{told.hexdigest()[:24]}.safetensors"
+
+
+class _Log:
+    """TensorBoard, if a folder is given."""
+
+    def __init__(self, folder: str) -> None:
+        self.writer = None
+        if folder:
+            try:
+                from torch.utils.tensorboard import SummaryWriter
+            except ImportError as error:
+                raise UnusableInput("log: TensorBoard is not installed: pip install tensorboard") from error
+            self.writer = SummaryWriter(folder)
+
+    def write(self, epoch: int, history: History) -> None:
+        if self.writer is not None:
+            for name in ("train", "valid", "rate"):
+                self.writer.add_scalar(name, getattr(history, name)[-1], epoch)
+            self.writer.flush()
+

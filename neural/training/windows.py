@@ -1,0 +1,75 @@
+"""The paper's way: a window of inputs in, the next sample of the outputs out; no state, no measured output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from simgap.neural.training.blocks import Block
+from simgap.neural.training.scaling import Scaling, features
+from simgap.records import Experiment, UnusableInput
+
+
+class Windows:
+    """All windows of some experiments: x(k-W) .. x(k-1) with y(k), for every k that has W samples before it.
+
+    A window lies within one experiment and is a view. `resident`: the scaled data are held in memory as float32;
+    otherwise a batch is made from the experiments when it is asked for (paper, 3.2), so that experiments whose arrays
+    are memory maps are read piece by piece.
+    """
+
+    def __init__(
+        self, experiments: Sequence[Experiment], of_x: Scaling, of_y: Scaling, window: int, time: bool, resident: bool
+    ) -> None:
+        self.window, self.time, self.of_x, self.of_y = window, time, of_x, of_y
+        self.experiments = [x for x in experiments if len(x) > window]
+        if not self.experiments:
+            raise UnusableInput(f"no experiment is longer than the window of {window} samples; choose a smaller window")
+        counts = [len(x) - window for x in self.experiments]
+        self.ends = np.cumsum(counts)
+        self.held: tuple[Tensor, Tensor] | None = None
+        if resident:
+            x = np.concatenate([of_x.inside(features(e.u, e.dt, time)) for e in self.experiments])
+            y = np.concatenate([of_y.inside(e.y) for e in self.experiments])
+            views = torch.from_numpy(x.astype(np.float32)).unfold(0, window, 1).transpose(1, 2)
+            self.held = views, torch.from_numpy(y.astype(np.float32))
+            firsts = np.concatenate(([0], np.cumsum([len(e) for e in self.experiments])[:-1]))
+            self.rows = torch.from_numpy(np.concatenate([f + np.arange(n) for f, n in zip(firsts, counts, strict=True)]))
+
+    def __len__(self) -> int:
+        return int(self.ends[-1])
+
+    def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Float[Tensor, "B W F"], Float[Tensor, "B ny"]]:
+        """Inputs and targets of the chosen windows, scaled."""
+        if self.held is not None:
+            views, y = self.held
+            rows = self.rows[chosen]
+            return views[rows], y[rows + self.window]
+        which = np.searchsorted(self.ends, chosen.numpy(), side="right")
+        xs, ys = [], []
+        for i, end in zip(which, chosen.numpy() - self.ends[which], strict=True):
+            e = self.experiments[i]
+            k = len(e) + int(end)  # the target
+            u = e.u[k - self.window : k]
+            t = e.dt * np.arange(k - self.window, k)
+            xs.append(np.column_stack((t, u)) if self.time else u)
+            ys.append(e.y[k])
+        x, y = self.of_x.inside(np.stack(xs)), self.of_y.inside(np.stack(ys))
+        return torch.from_numpy(x.astype(np.float32)), torch.from_numpy(y.astype(np.float32))
+
+    def answer(self, net: Block, x: Float[Tensor, "B W F"]) -> Float[Tensor, "B ny"]:
+        """What the network says to a batch."""
+        return net.last(x)
+
+
+def simulate(
+    net: Block, x: Float[Tensor, "T F"], n: int, window: int, at_once: int = 1024
+) -> Float[Tensor, "T-n ny"]:
+    """Rows n .. T-1 of one experiment; before its start the inputs stood still."""
+    padded = torch.cat((x[:1].expand(max(0, window - n), -1), x[max(0, n - window) : -1]))
+    views = padded.unfold(0, window, 1).transpose(1, 2)
+    return torch.cat([net.last(part) for part in views.split(at_once)])
