@@ -10,8 +10,8 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
-# NumPy has the newest version that the peer sysidentpy accepts.
-PINNED := numpy==2.3.5
+# NumPy has the newest version that the peer sysidentpy accepts; of torch a free range brings gigabytes of CUDA.
+PINNED := numpy==2.3.5 torch==2.13.0
 
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 # The name holds the version, so that another Python makes another environment.
@@ -82,12 +82,12 @@ lock:
 	@[ "$(VERSION)" = 3.11 ] || { echo "the lock files need Python 3.11: make lock PYTHON=python3.11" >&2; exit 1; }
 	@rm -rf build && mkdir build && $(PYTHON) -m venv build/lock
 	@build/lock/bin/python -m pip install --quiet --upgrade pip
-	@build/lock/bin/python -m pip install --quiet "$(PINNED)" --group dev .
+	@build/lock/bin/python -m pip install --quiet $(PINNED) --group dev .
 	@grep '^#' requirements.lock > build/requirements.lock
-	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap >> build/requirements.lock
+	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap | sed 's/+cpu$$//' >> build/requirements.lock
 	@build/lock/bin/python -m pip install --quiet -r build/requirements.lock ".[peers]"
 	@grep '^#' requirements-peers.lock > build/requirements-peers.lock
-	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap \
+	@build/lock/bin/python -m pip freeze --all --exclude pip --exclude simgap | sed 's/+cpu$$//' \
 	  | grep -vxFf build/requirements.lock >> build/requirements-peers.lock
 	@mv build/requirements.lock build/requirements-peers.lock .
 	@git diff --stat -- '*.lock' || true

@@ -37,8 +37,14 @@ class Delta:
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """The simulated differences, summed up from the last of the n measured samples."""
-        differences = self.inner.simulate(u[:, 1:], np.diff(y_init, axis=1))
+        """The simulated differences, summed up from the last of the n measured samples.
+
+        Before a single sample the machine is taken to have stood still.
+        """
+        if y_init.shape[1] == 1:
+            differences = self.inner.simulate(u, np.zeros_like(y_init))
+        else:
+            differences = self.inner.simulate(u[:, 1:], np.diff(y_init, axis=1))
         return y_init[:, -1:] + np.cumsum(differences, axis=1)
 
     @property

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from simgap.data import Missing, describe, fetch, load, save
     from simgap.diagnosis.diagnose import diagnose
     from simgap.fitting import Fit, fit
+    from simgap.neural.training.weights import load_model
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
@@ -22,6 +23,7 @@ _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
     "simgap.diagnosis.diagnose": ("diagnose",),
     "simgap.fitting": ("Fit", "fit"),
+    "simgap.neural.training.weights": ("load_model",),
     "simgap.protocol": ("Model",),
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
@@ -36,7 +38,7 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 __all__ = [
     "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
     "Progress", "Result", "Suite", "TrainingSet", "UnusableInput", "describe", "diagnose", "fetch", "fit", "load",
-    "load_suite", "report", "run", "save",
+    "load_model", "load_suite", "report", "run", "save",
 ]  # fmt: skip
 
 

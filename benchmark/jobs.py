@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+import hashlib
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from simgap.fitting import build, fit_model, reason, score_model
 from simgap.metrics import failed_metrics
+from simgap.protocol import listen
 from simgap.records import Channels, Dataset, Result, Status
 from simgap.store import plain
 from simgap.suites import Entry
@@ -91,11 +96,27 @@ def execute(job: Job) -> list[Result]:
     if dataset.sha256 != job.card.sha256:
         return job.failed("error", "the data set changed while the run was under way; run again")
     try:
+        listen(_note_of(job))
         model = build(job.entry.name, job.entry.params)
         about = fit_model(model, dataset.training, job.about)
     except (Exception, SystemExit) as error:  # a model may raise anything
         return job.failed("error", reason("fit", error))
     return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
+
+
+def progress_file(folder: str | Path, job: Job) -> Path:
+    """Where a worker notes how far a job is."""
+    return Path(folder) / hashlib.sha256(repr((str(job), job.entry)).encode()).hexdigest()[:24]
+
+
+def _note_of(job: Job) -> Callable[[int, int], None] | None:
+    folder = os.environ.get("SIMGAP_PROGRESS")
+    return None if folder is None else lambda done, total: _note(progress_file(folder, job), done, total)
+
+
+def _note(file: Path, done: int, total: int) -> None:
+    with contextlib.suppress(OSError):  # a full disk must not end a fit
+        file.write_text(f"{done} {total}", encoding="ascii")
 
 
 @lru_cache(maxsize=1)

@@ -35,15 +35,16 @@ class Model(Protocol):
         ...
 
 
-_listeners: list[Callable[[int, int], None]] = []
+_listener: Callable[[int, int], None] | None = None
 
 
 def progress(done: int, total: int) -> None:
     """A model whose fit takes long may say how far it is, in steps of its own such as epochs."""
-    for listener in _listeners:
-        listener(done, total)
+    if _listener is not None:
+        _listener(done, total)
 
 
-def listen(listener: Callable[[int, int], None]) -> None:
-    """Have `listener(done, total)` called whenever a model of this process says how far it is."""
-    _listeners.append(listener)
+def listen(listener: Callable[[int, int], None] | None) -> None:
+    """Have `listener(done, total)` called when a model of this process says how far it is; None: nobody."""
+    global _listener  # noqa: PLW0603  # one fit at a time runs in a process
+    _listener = listener

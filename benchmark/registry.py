@@ -22,6 +22,14 @@ def origin(target: Any) -> tuple[str, str]:
     return target.__module__, target.__qualname__
 
 
+@dataclass(frozen=True)
+class _Entry:
+    """Where a name was found, and the first line of its docstring."""
+
+    module: str
+    title: str
+
+
 @dataclass
 class Registry:
     """Things of one kind by name, found by scanning packages for `@REGISTRY.register("name")`.
@@ -34,7 +42,7 @@ class Registry:
     packages: tuple[str, ...]
     constant: str
     _found: dict[str, Any] = field(default_factory=dict)
-    _modules: dict[str, str] | None = None
+    _entries: dict[str, _Entry] | None = None
 
     def register(self, name: str) -> Callable[[T], T]:
         """Class or function decorator that files its target under `name`; a name taken twice is an error."""
@@ -70,7 +78,7 @@ class Registry:
         if name in self._found:
             return self._found[name]
         if name in self._index():
-            module = self._index()[name]
+            module = self._index()[name].module
             try:
                 importlib.import_module(module)
             except ImportError as error:
@@ -83,8 +91,23 @@ class Registry:
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
         raise UnusableInput(f"there is no {self.kind} called {name!r}; known are {', '.join(self.names())}")
 
+    def title(self, name: str) -> str:
+        """The first line of its docstring; nothing is imported unless it comes from somebody's own package."""
+        if name in self._index():
+            return self._index()[name].title
+        return next(iter((self[name].__doc__ or "").strip().splitlines()), "")
+
     def why_missing(self, name: str) -> str:
-        """Empty when `name` can be used, else the reason why not."""
+        """Empty when `name` can be used, else the reason why not.
+
+        Where a package says what it REQUIRES, that is looked for instead of importing what takes seconds.
+        """
+        package = self._index()[name].module.rpartition(".")[0] if name in self._index() else ""
+        required = getattr(importlib.import_module(package), "REQUIRES", ()) if package else ()
+        if missing := [part for part in required if importlib.util.find_spec(part) is None]:
+            return f"{self.kind} {name} is not available: {', '.join(missing)} is not installed"
+        if required:
+            return ""
         try:
             self[name]
         except UnusableInput as error:
@@ -94,13 +117,14 @@ class Registry:
     def _plugins(self) -> dict[str, Any]:
         return {point.name: point for point in entry_points(group=f"simgap.{self.kind.replace(' ', '')}s")}
 
-    def _index(self) -> dict[str, str]:
-        if self._modules is None:
-            self._modules = {}
+    def _index(self) -> dict[str, _Entry]:
+        if self._entries is None:
+            self._entries = {}
             for package in self.packages:
                 for module, path in _files(package):
-                    self._modules |= dict.fromkeys(_registered_names(path, self.constant), module)
-        return self._modules
+                    for name, title in _registered(path, self.constant):
+                        self._entries[name] = _Entry(module, title)
+        return self._entries
 
 
 def _files(package: str) -> Iterator[tuple[str, Path]]:
@@ -110,20 +134,22 @@ def _files(package: str) -> Iterator[tuple[str, Path]]:
             yield f"{package}.{path.stem}", path
 
 
-def _registered_names(path: Path, constant: str) -> list[str]:
-    names = []
+def _registered(path: Path, constant: str) -> Iterator[tuple[str, str]]:
+    """Names that decorators of a file register, each with the first line of what it decorates says of itself."""
     try:
         tree = ast.parse(path.read_text(encoding="utf-8"))
     except SyntaxError:
-        return []  # importing the file by hand tells its author more than we could
+        return  # importing the file by hand tells its author more than we could
     for node in ast.walk(tree):
-        match node:
-            case ast.Call(
-                func=ast.Attribute(value=ast.Name(id=found), attr="register"),
-                args=[ast.Constant(value=str(name))],
-            ) if found == constant:
-                names.append(name)
-    return names
+        if not isinstance(node, ast.ClassDef | ast.FunctionDef):
+            continue
+        for decorator in node.decorator_list:
+            match decorator:
+                case ast.Call(
+                    func=ast.Attribute(value=ast.Name(id=found), attr="register"),
+                    args=[ast.Constant(value=str(name))],
+                ) if found == constant:
+                    yield name, next(iter((ast.get_docstring(node) or "").splitlines()), "")
 
 
 MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")

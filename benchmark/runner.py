@@ -7,6 +7,7 @@ import logging
 import multiprocessing
 import signal
 import sys
+import tempfile
 import threading
 import types
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -17,7 +18,7 @@ from pathlib import Path
 from pebble import ProcessExpired, ProcessPool
 
 from simgap import planning, store
-from simgap.jobs import Job, execute
+from simgap.jobs import Job, execute, progress_file
 from simgap.provenance import provenance
 from simgap.records import Result, UnusableInput
 from simgap.suites import load_suite
@@ -33,6 +34,7 @@ class Progress:
     running: tuple[str, ...] = ()
     finished: tuple[Result, ...] = ()
     note: str = ""
+    share: float = 0.0  # of all jobs, those under way counted as far as they say they are
 
 
 Listener = Callable[[Progress], None]
@@ -80,7 +82,10 @@ def run(
     if len(todo) < len(planned):
         note(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")
     results = [row for rows in stored for row in rows]
-    with contextlib.closing(_execute_all(todo, min(jobs, len(todo)), threads, chosen.timeout, tell)) as outcomes:
+    # What an interrupted fit left to carry on from; gone with the fit.
+    folders = {"SIMGAP_CHECKPOINTS": str(Path(out).absolute() / ".checkpoints")}
+    workers = min(jobs, len(todo))
+    with contextlib.closing(_execute_all(todo, workers, threads, chosen.timeout, folders, tell)) as outcomes:
         for rows in outcomes:
             store.append(Path(out), chosen.name, rows)
             results += rows
@@ -88,14 +93,16 @@ def run(
 
 
 def _execute_all(
-    todo: Sequence[Job], workers: int, threads: int, timeout: float, tell: Listener
+    todo: Sequence[Job], workers: int, threads: int, timeout: float, folders: dict[str, str], tell: Listener
 ) -> Generator[list[Result], None, None]:
     """The results of each job, in the order in which they end."""
     if not todo:
         return
     with _main_left_alone(), _interrupts() as interrupted, contextlib.ExitStack() as stack:
+        notes = stack.enter_context(tempfile.TemporaryDirectory(prefix="simgap"))
         context = multiprocessing.get_context("spawn")
-        pool = ProcessPool(workers, initializer=prepare_worker, initargs=(threads,), context=context)
+        given = (threads, folders | {"SIMGAP_PROGRESS": notes})
+        pool = ProcessPool(workers, initializer=prepare_worker, initargs=given, context=context)
         stack.callback(pool.join)
         stack.callback(pool.stop)  # runs before join, and after Ctrl-C too
         pending: dict[Future, Job] = {pool.schedule(execute, (job,), timeout=timeout): job for job in todo}
@@ -108,8 +115,19 @@ def _execute_all(
                 rows = _outcome(future, job, timeout)
                 yield rows
                 tell(Progress(len(todo) - len(pending), len(todo), finished=tuple(rows)))
-            running = tuple(str(job) for future, job in pending.items() if future.running())
-            tell(Progress(len(todo) - len(pending), len(todo), running))
+            running = [(job, _share(progress_file(notes, job))) for future, job in pending.items() if future.running()]
+            names = tuple(f"{job} ({share:.0%})" if share else str(job) for job, share in running)
+            done = len(todo) - len(pending)
+            tell(Progress(done, len(todo), names, share=(done + sum(share for _, share in running)) / len(todo)))
+
+
+def _share(file: Path) -> float:
+    """How far a worker says that its job is; zero if it says nothing."""
+    try:
+        done, total = map(int, file.read_text(encoding="ascii").split())
+        return min(1.0, done / total)
+    except (OSError, ValueError, ZeroDivisionError):
+        return 0.0
 
 
 def _outcome(future: Future, job: Job, timeout: float) -> list[Result]:

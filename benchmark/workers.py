@@ -13,9 +13,13 @@ _VARIABLES = (
 )
 
 
-def prepare_worker(threads: int) -> None:
-    """Limit the threads of this process, and end it when its parent ends."""
+def prepare_worker(threads: int, folders: dict[str, str] | None = None) -> None:
+    """Limit the threads of this process, and end it when its parent ends.
+
+    folders: environment variables that name where models may keep what they need to carry on (SIMGAP_CHECKPOINTS).
+    """
     limit_threads(threads)
+    os.environ.update(folders or {})
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -14,10 +14,10 @@ from simgap.registry import MODELS
 class Conv1D(Network):
     """[Conv1D(channels, kernel) - ReLU - average of 2] twice - FC(channels) - ReLU - FC(ny); model 4 of the paper.
 
-    The paper gives no widths: 32 channels and 5 samples here.
+    The paper gives no widths: 24 channels and 5 samples here.
     """
 
-    channels: int = 32
+    channels: int = 24
     kernel: int = 5
 
     def net(self, inputs: int, outputs: int) -> Block:

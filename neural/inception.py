@@ -15,12 +15,12 @@ from simgap.registry import MODELS
 class Inception(Network):
     """[GRU | LSTM | Conv1D] - FC - ReLU - FC with a skip connection around both - FC(ny); model 5 of the paper.
 
-    The paper gives no widths: 32 features from each branch and 48 between the fully connected layers here.
+    The paper gives no widths: 16 features from each branch and 32 between the fully connected layers here.
     """
 
-    units: int = 32
+    units: int = 16
     kernel: int = 5
-    hidden: int = 48
+    hidden: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:
         """An untrained network with random weights."""

@@ -14,10 +14,10 @@ from simgap.registry import MODELS
 class TCN(Network):
     """Dilated causal residual blocks - FC(ny); model 9 of the paper.
 
-    The paper gives no widths: 24 channels, kernel 3 and four blocks of dilation 1, 2, 4, 8 here, which see 61 samples.
+    The paper gives no widths: 16 channels, kernel 3 and four blocks of dilation 1, 2, 4, 8 here, which see 61 samples.
     """
 
-    channels: int = 24
+    channels: int = 16
     kernel: int = 3
     blocks: int = 4
 

@@ -9,9 +9,13 @@ import pandas as pd
 
 from simgap import store
 from simgap.records import Result, UnusableInput
+from simgap.reports.claims import claims, claims_table
+from simgap.reports.paper import of_paper, paper_tables
 from simgap.reports.published import published_markdown
 from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
+
+FEW = 2  # data sets, whose figures are shown after a run
 
 _HOW_TO_READ = (
     "Every model is simulated over the whole test record from its first measured outputs alone (free run). "
@@ -46,9 +50,22 @@ def report(folder: str | Path = "results") -> Report:
 
 
 def tables_of(results: list[Result]) -> list[Table]:
-    """The overview, then each data set's table."""
-    datasets = sorted({result.dataset for result in results})
-    return [overview(results), *(dataset_table(results, dataset) for dataset in datasets)]
+    """The paper's tables and claims if these are results of its suite, the overview, then each data set's table."""
+    return [*_of_paper(results), overview(results), *_of_datasets(results)]
+
+
+def brief(results: list[Result]) -> list[Table]:
+    """What is shown after a run: the figures of a few data sets in their units, of many the overview."""
+    details = _of_datasets(results)
+    return [*_of_paper(results), *(details if len(details) <= FEW else [overview(results)])]
+
+
+def _of_paper(results: list[Result]) -> list[Table]:
+    return [*paper_tables(results), claims_table(claims(results))] if of_paper(results) else []
+
+
+def _of_datasets(results: list[Result]) -> list[Table]:
+    return [dataset_table(results, dataset) for dataset in sorted({result.dataset for result in results})]
 
 
 def _read(folder: Path) -> dict[str, list[Result]]:

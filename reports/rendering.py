@@ -5,56 +5,72 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from simgap.reports.tables import Table
+from simgap.reports.tables import Cell, Table
 
 if TYPE_CHECKING:
     import rich.console
 
-LEFT = ("model", "status")  # columns of words
+LEFT = ("model", "status", "claim", "section", "verdict", "evidence", "the paper's figures")  # columns of words
 WIDEST_WORD = 18  # of a heading on a terminal, where longer ones are broken
+WIDEST_TEXT = 24  # of a column of words on a narrow terminal; a wide one gives half of what numbers leave
 
 
 def to_rich(table: Table, width: int = 120) -> rich.console.Group:
-    """The table for a terminal `width` characters wide, the best of a column in bold, footnotes below.
+    """The table for a terminal `width` characters wide, the best of a column in bold, the second best underlined,
+    footnotes below.
 
-    Headings wrap, numbers never: the last columns are left out, and named, where the width does not suffice.
+    Words wrap, numbers never: the last columns are left out, and named, where the width does not suffice.
     """
     from rich import box
     from rich.console import Group
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    widths = [_width(table, i) for i in range(len(table.columns))]
+    widths = [_width(table, i, width) for i in range(len(table.columns))]
     shown = max((n for n in range(len(widths) + 1) if sum(widths[:n]) + 2 * n < width), default=0)
     drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for column, column_width in zip(table.columns[:shown], widths, strict=False):
         heading = Text(printable(column), overflow="fold")
         drawn.add_column(heading, justify="left" if column in LEFT else "right", width=column_width)
     for row in table.rows:
-        drawn.add_row(*(Text(printable(c.text), style="bold" if c.best else "") for c in row[:shown]))
+        # Appended, because the style of a whole Text would underline the blanks beside a number.
+        drawn.add_row(*(Text().append(printable(c.text), style=_style(c)) for c in row[:shown]))
     notes = _numbered(table)
     if shown < len(widths):
         notes.append(f"Not shown on this narrow terminal: {printable(', '.join(table.columns[shown:]))}")
     return Group(Text(printable(table.title), style="bold"), drawn, *map(Text, notes), Text())
 
 
-def _width(table: Table, column: int) -> int:
-    """Characters that a column takes: its longest entry, or the longest word of its heading."""
+def _width(table: Table, column: int, width: int) -> int:
+    """Characters that a column takes: its longest entry, or the longest word of its heading; words may wrap."""
     word = max(map(len, table.columns[column].split()), default=0)
-    return max(min(word, WIDEST_WORD), *(len(row[column].text) for row in table.rows), 1)
+    entry = max((len(row[column].text) for row in table.rows), default=0)
+    if table.columns[column] in LEFT:
+        entry = min(entry, max(WIDEST_TEXT, (width - 52) // 2))
+    return max(min(word, WIDEST_WORD), entry, 1)
+
+
+def _style(cell: Cell) -> str:
+    if cell.best:
+        return "bold"
+    return "underline" if cell.second else ""
 
 
 def to_markdown(table: Table, level: int = 2) -> str:
-    """The table as Markdown under a heading of that level."""
+    """The table as Markdown under a heading of that level, the best of a column bold, the second best in italics."""
     lines = [f"{'#' * level} {escape(table.title)}", ""]
     lines.append("| " + " | ".join(escape(column) for column in table.columns) + " |")
     lines.append("|" + "".join("---|" if column in LEFT else "--:|" for column in table.columns))
     for row in table.rows:
-        cells = [f"**{escape(cell.text)}**" if cell.best else escape(cell.text) for cell in row]
-        lines.append("| " + " | ".join(cells) + " |")
+        lines.append("| " + " | ".join(map(_marked, row)) + " |")
     for note in _numbered(table):
         lines += ["", escape(note)]
     return "\n".join(lines) + "\n"
+
+
+def _marked(cell: Cell) -> str:
+    mark = "**" if cell.best else "*" if cell.second else ""
+    return mark + escape(cell.text) + mark
 
 
 def escape(text: str) -> str:

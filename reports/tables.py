@@ -21,11 +21,12 @@ FIGURES = ("rmse", "nrmse", "fit_percent", "r2", "mse", "mae", "std", "n_scored"
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry: its text, and the number by which the best entry of a column is found."""
+    """One entry: its text, and the number by which the best entry of a column, or the second best, is found."""
 
     text: str
     value: float | None = None
     best: bool = False
+    second: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def overview(results: Sequence[Result]) -> Table:
     """Fit in percent of the free run: models down, data sets across, the best model first."""
     found = standings(results)
     datasets = sorted({standing.dataset for standing in found})
-    notes = _Notes()
+    notes = Notes()
     rows = []
     for model in dict.fromkeys(s.model for s in found):
         mine = {s.dataset: s for s in found if s.model == model}
@@ -93,28 +94,35 @@ def dataset_table(results: Sequence[Result], dataset: str) -> Table:
         columns += [_with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
     columns += ["parameters", "fit s"]
 
-    notes = _Notes()
+    notes = Notes()
     found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
     rows = []
     for standing in found:
-        errors = [_cell(standing.rmse(output, group), ".4g", standing.failed) for group in groups for output in units]
+        errors = [
+            spread_cell(standing.rmse(output, group), ".4g", standing.failed) for group in groups for output in units
+        ]
         ahead = [_ahead(standing, output, horizons) for output in units if horizons]
         size, seconds = standing.n_params(), standing.seconds()
         rows.append([
-            Cell(standing.model), Cell(_status(standing) + notes.of(standing)),
-            *errors, _cell(standing.fit_percent(), "z.1f", standing.failed), *ahead,
+            Cell(standing.model), Cell(status_of(standing) + notes.of(standing)),
+            *errors, spread_cell(standing.fit_percent(), "z.1f", standing.failed), *ahead,
             Cell("" if size is None else str(size)), Cell("" if seconds is None else f"{seconds:.2g}"),
         ])  # fmt: skip
     n_errors = len(groups) * len(units)
     for column in range(2, n_errors + 2):
         _mark_best(rows, column, min)
     _mark_best(rows, n_errors + 2, max)
-    if len({row.provenance.get("data_sha256") for row in rows_of}) > 1:
-        notes.texts.append("These rows come from different versions of the data set; run the suite again.")
-    return Table(dataset, columns, rows, notes.texts)
+    return Table(dataset, columns, rows, notes.texts + warnings_of(rows_of))
 
 
-class _Notes:
+def warnings_of(rows: Sequence[Result]) -> list[str]:
+    """What is wrong with rows of one data set in one table."""
+    if len({row.provenance.get("data_sha256") for row in rows}) > 1:
+        return ["These rows come from different versions of the data set; run the suite again."]
+    return []
+
+
+class Notes:
     """Footnotes of one table, numbered as they come; one text has one number."""
 
     def __init__(self) -> None:
@@ -131,7 +139,8 @@ class _Notes:
         return marks
 
 
-def _cell(spread: Spread | None, form: str, failed: bool) -> Cell:
+def spread_cell(spread: Spread | None, form: str, failed: bool) -> Cell:
+    """The median, and the range where the seeds differ."""
     if spread is None:
         return Cell("")
     if failed and math.isinf(spread.median):
@@ -142,9 +151,9 @@ def _cell(spread: Spread | None, form: str, failed: bool) -> Cell:
     return Cell(text, spread.median)
 
 
-def _fit_cell(standing: Standing, notes: _Notes) -> Cell:
-    cell = _cell(standing.fit_percent(), "z.1f", standing.failed)
-    text = _status(standing) if cell.text == "-" else cell.text
+def _fit_cell(standing: Standing, notes: Notes) -> Cell:
+    cell = spread_cell(standing.fit_percent(), "z.1f", standing.failed)
+    text = status_of(standing) if cell.text == "-" else cell.text
     return replace(cell, text=text + notes.of(standing))
 
 
@@ -157,7 +166,8 @@ def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:
     return Cell("/".join("" if value is None else f"{value:.3g}" for value in medians))
 
 
-def _status(standing: Standing) -> str:
+def status_of(standing: Standing) -> str:
+    """The status of all rows, or how many have which."""
     counts = {status: 0 for status in ("ok", "diverged", "error", "timeout")}
     for row in standing.rows:
         counts[row.status] += 1

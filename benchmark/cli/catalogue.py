@@ -46,7 +46,7 @@ def _models() -> list[dict[str, str]]:
     entries = []
     for name in MODELS:
         missing = MODELS.why_missing(name)
-        entries.append({"name": name, "title": "" if missing else _first_line(MODELS[name]), "missing": missing})
+        entries.append({"name": name, "title": "" if missing else MODELS.title(name), "missing": missing})
     return entries
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -25,6 +26,7 @@ def fit(
     dt: SamplingTime = None,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
+    save: Annotated[Path | None, typer.Option(help="Folder for the weights of a network.")] = None,
     json: Json = None,
 ) -> None:
     """Fit one model and print what it chose and how well it simulates the test experiments."""
@@ -34,6 +36,8 @@ def fit(
     from simgap.records import UnusableInput
 
     params = parse_params(param or ())
+    if save is not None and not hasattr(fitting.model_class(model), "save"):
+        raise UnusableInput(f"--save: {model} is no network, and only networks have weights to save")
     console = Console()
     try:
         done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
@@ -44,6 +48,8 @@ def fit(
         raise typer.Exit(1) from None
     if json is not None:
         write_json(json, store.encoded(done.results))
+    if save is not None:
+        done.model.save(save)
     _print_model(console, done)
     console.print(_scores(done.results))
     if any(result.status == "error" for result in done.results):
@@ -55,7 +61,8 @@ def _print_model(console: rich.console.Console, done: Fit) -> None:
     size = "" if first.n_params is None else f", parameters: {first.n_params}"
     lines = [f"{first.model} on {first.dataset}: fitted in {first.fit_seconds:.3g} s{size}"]
     if first.fitted:
-        lines.append("chosen: " + ", ".join(f"{name} = {value}" for name, value in first.fitted.items()))
+        lines.append("chosen: " + ", ".join(
+            f"{name} = {value}" for name, value in first.fitted.items() if not isinstance(value, list)))
     summary = getattr(done.model, "summary", None)
     if callable(summary):
         lines.append(str(summary()))

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from simgap.runner import Listener, Progress
 
 FAILED = ("error", "timeout")
-FEW = 2
 
 
 def run(
@@ -48,7 +47,7 @@ def run(
     from rich.console import Console
 
     from simgap import runner, store
-    from simgap.reports.leaderboard import tables_of
+    from simgap.reports.leaderboard import brief
     from simgap.reports.rendering import to_rich
 
     console = Console()
@@ -63,9 +62,7 @@ def run(
         raise typer.Exit(130) from None
     if json is not None:
         write_json(json, store.encoded(results))
-    summary, *details = tables_of(results)
-    # The figures of a few data sets in their units; of many, a summary.
-    for table in details if len(details) <= FEW else [summary]:
+    for table in brief(results):
         console.print(to_rich(table, console.width))
     where = f"The results are in {out}; `simgap report {out}` makes the leaderboard."
     console.print(where, markup=False, highlight=False)
@@ -79,12 +76,12 @@ def _shown(console: rich.console.Console) -> Iterator[Listener]:
     if not console.is_terminal:
         yield lambda progress: _print_line(console, progress)
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
     columns = (
         BarColumn(),
-        MofNCompleteColumn(),
+        TaskProgressColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.description}", markup=False),
     )
@@ -95,7 +92,8 @@ def _shown(console: rich.console.Console) -> Iterator[Listener]:
             _print_line(console, progress)
             if progress.total:
                 running = ", ".join(progress.running)
-                bar.update(task, completed=progress.done, total=progress.total, description=running)
+                share = max(progress.share, progress.done / progress.total)
+                bar.update(task, completed=share, total=1, description=f"{progress.done}/{progress.total}  {running}")
 
         yield show
 

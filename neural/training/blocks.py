@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from simgap.neural.training.convolution import Convolution
 from simgap.neural.training.recurrent import Layer
 
 
@@ -47,97 +48,82 @@ class Recurrences(Block):
 class Pooled(Block):
     """Two convolutions over time with average pooling, and a fully connected layer over what is left of the window.
 
-    conv(F, C, k) - ReLU - mean of 2 - conv(C, C, k) - ReLU - mean of 2 - FC(C). A sequence is a window at every sample:
-    then the layers after a pooling leave out samples instead (Shensa 1992, the algorithm "a trous").
+    conv(F, C, k) - ReLU - mean of 2 - conv(C, C, k) - ReLU - mean of 2 - FC(C) - ReLU. A sequence is a window at every
+    sample: then what follows a pooling leaves out samples instead (Holschneider 1989, the algorithm "a trous").
     """
 
     def __init__(self, inputs: int, channels: int, kernel: int, window: int) -> None:
         super().__init__()
-        self.window = window
-        self.first = nn.Conv1d(inputs, channels, kernel)
-        self.second = nn.Conv1d(channels, channels, kernel)
-        self.full = nn.Conv1d(channels, channels, max(1, window // 4))
-        for conv in (self.first, self.second, self.full):
-            initialise(conv)
+        self.first = Convolution(inputs, channels, kernel)
+        self.second = Convolution(channels, channels, kernel)
+        self.full = Convolution(channels, channels, window // 4)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """Features of the window that ends at each sample; before the start there are zeros."""
-        x = torch.relu(causal(self.first, x.transpose(1, 2), 1))
-        x = (x + before(x, 1)) / 2
-        x = torch.relu(causal(self.second, x, 2))
-        x = (x + before(x, 2)) / 2
-        return torch.relu(causal(self.full, x, 4)).transpose(1, 2)
+        x = self.first.over(x)
+        x = (x + _before(x, 1)) / 2
+        x = self.second.over(x, 2)
+        x = (x + _before(x, 2)) / 2
+        return self.full.over(x, 4)
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
         """Features of the window, of which a remainder of fewer than four samples is left out at its start."""
-        x = x[:, len(x[0]) % 4 :].transpose(1, 2)
-        x = nn.functional.avg_pool1d(torch.relu(causal(self.first, x, 1)), 2)
-        x = nn.functional.avg_pool1d(torch.relu(causal(self.second, x, 1)), 2)
-        return torch.relu(torch.addmm(self.full.bias, x.flatten(1), self.full.weight.flatten(1).t()))
+        x = _mean_of_two(self.first.over(x[:, x.shape[1] % 4 :]))
+        x = _mean_of_two(self.second.over(x))
+        weight = self.full.weight.transpose(1, 2).flatten(1)
+        return torch.relu(nn.functional.linear(x.flatten(1), weight, self.full.bias))
 
 
 class Tcn(Block):
     """Temporal convolutional network: residual blocks of two dilated causal convolutions (Bai, Kolter, Koltun 2018).
 
     y = ReLU(x + F(x)), F = conv - ReLU - dropout - conv - ReLU - dropout, dilation 1, 2, 4, ... from block to block;
-    x passes through a 1 x 1 convolution where the number of channels changes.
+    the input passes through a 1 x 1 convolution on its way around the first block.
     """
 
     def __init__(self, inputs: int, channels: int, kernel: int, blocks: int, dropout: float = 0.0) -> None:
         super().__init__()
-        sizes = [inputs] + [channels] * blocks
-        self.one = nn.ModuleList(nn.Conv1d(size, channels, kernel) for size in sizes[:-1])
-        self.two = nn.ModuleList(nn.Conv1d(channels, channels, kernel) for _ in sizes[:-1])
-        self.through = nn.Conv1d(inputs, channels, 1)
+        sizes = [inputs] + [channels] * (blocks - 1)
+        self.one = nn.ModuleList(Convolution(size, channels, kernel) for size in sizes)
+        self.two = nn.ModuleList(Convolution(channels, channels, kernel) for _ in sizes)
+        self.through = full(inputs, channels)
         self.dropout = nn.Dropout(dropout)
-        for conv in (*self.one, *self.two, self.through):
-            initialise(conv)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """Features at all samples; before the start there are zeros."""
-        x = x.transpose(1, 2)
         for level in range(len(self.one)):
             x = self._block(x, level, 2**level)
-        return x.transpose(1, 2)
+        return x
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
         """The same at the last sample: a block of dilation d needs every d-th sample only, counted from the end."""
-        x = x.transpose(1, 2)
         for level in range(len(self.one)):
             if level:
-                x = x[:, :, (x.shape[2] - 1) % 2 :: 2]
+                x = x[:, (x.shape[1] - 1) % 2 :: 2]
             x = self._block(x, level, 1)
-        return x[:, :, -1]
+        return x[:, -1]
 
     def _block(self, x: Tensor, level: int, dilation: int) -> Tensor:
         inner = x
-        for conv in (self.one[level], self.two[level]):
-            inner = self.dropout(torch.relu(causal(conv, inner, dilation)))
+        for convolution in (self.one[level], self.two[level]):
+            inner = self.dropout(convolution.over(inner, dilation))
         return torch.relu(inner + (x if level else self.through(x)))
 
 
-def causal(conv: nn.Conv1d, x: Float[Tensor, "B F T"], dilation: int) -> Float[Tensor, "B G T"]:
-    """The convolution with zeros before the first sample."""
-    x = nn.functional.pad(x, ((conv.kernel_size[0] - 1) * dilation, 0))
-    return nn.functional.conv1d(x, conv.weight, conv.bias, dilation=dilation)
-
-
-def before(x: Float[Tensor, "B F T"], samples: int) -> Float[Tensor, "B F T"]:
+def _before(x: Float[Tensor, "B T F"], samples: int) -> Float[Tensor, "B T F"]:
     """The signal so many samples earlier, zero before its start."""
-    return nn.functional.pad(x, (samples, 0))[:, :, : x.shape[2]]
+    return nn.functional.pad(x, (0, 0, samples, 0))[:, : x.shape[1]]
 
 
-def initialise(layer: nn.Conv1d | nn.Linear) -> None:
-    """Initial weights as in Keras: Glorot uniform, offsets zero."""
-    nn.init.xavier_uniform_(layer.weight)
-    if layer.bias is not None:
-        nn.init.zeros_(layer.bias)
+def _mean_of_two(x: Float[Tensor, "B T F"]) -> Float[Tensor, "B S F"]:
+    return x.unflatten(1, (-1, 2)).mean(2)
 
 
 def full(inputs: int, outputs: int) -> nn.Linear:
-    """A fully connected layer."""
+    """A fully connected layer with the initial weights of Keras: Glorot uniform, offsets zero."""
     layer = nn.Linear(inputs, outputs)
-    initialise(layer)
+    nn.init.xavier_uniform_(layer.weight)
+    nn.init.zeros_(layer.bias)
     return layer
 
 

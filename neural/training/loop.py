@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Protocol
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.checkpoints import Checkpoint
+from simgap.neural.training.examples import Examples
 
 # Windows or pieces whose error is computed at once.
 AT_ONCE = 512
@@ -22,20 +22,6 @@ AT_ONCE = 512
 
 class NotANumber(ArithmeticError):
     """The loss grew beyond all bounds."""
-
-
-class Examples(Protocol):
-    """What a network is trained on."""
-
-    def __len__(self) -> int: ...
-
-    def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Tensor, Tensor]:
-        """Features and targets."""
-        ...
-
-    def answer(self, net: Block, x: Tensor) -> Tensor:
-        """What the network says to the features."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -100,10 +86,7 @@ def train(
         begin = time.perf_counter()
         net.train()
         total = torch.zeros((), device=device)
-        shuffled = torch.randperm(len(examples), generator=order)
-        if recipe.batches:
-            shuffled = shuffled[: recipe.batches * recipe.batch]
-        batches = shuffled.split(recipe.batch)
+        batches = _shuffled(len(examples), recipe, order)
         for chosen in batches:
             x, y = (part.to(device) for part in examples.batch(chosen))
             for p in net.parameters():
@@ -112,7 +95,7 @@ def train(
             loss.backward()
             adam.step()
             total += loss.detach() * len(chosen)
-        history.train.append(float(total) / len(shuffled))
+        history.train.append(float(total) / sum(map(len, batches)))
         history.valid.append(error(net, held_out, device))
         history.rate.append(adam.param_groups[0]["lr"])
         history.seconds.append(time.perf_counter() - begin)
@@ -129,6 +112,13 @@ def train(
     net.load_state_dict(best)
     net.to("cpu").eval()
     return history
+
+
+def _shuffled(examples: int, recipe: Recipe, order: torch.Generator) -> tuple[Tensor, ...]:
+    """The batches of an epoch: all examples, or as many as the recipe says, again from the start if there are fewer."""
+    wanted = recipe.batches * recipe.batch or examples
+    rounds = [torch.randperm(examples, generator=order) for _ in range(-(-wanted // examples))]
+    return torch.cat(rounds)[:wanted].split(recipe.batch)
 
 
 def error(net: Block, examples: Examples, device: str = "cpu") -> float:

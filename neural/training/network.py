@@ -16,7 +16,8 @@ from jaxtyping import Float
 
 from simgap.neural.training import sequences, weights, windows
 from simgap.neural.training.blocks import Block
-from simgap.neural.training.loop import Examples, History, Recipe, figures, range_test, train
+from simgap.neural.training.examples import Examples
+from simgap.neural.training.loop import History, Recipe, figures, range_test, train
 from simgap.neural.training.scaling import Scaling, features, scalings
 from simgap.protocol import progress
 from simgap.records import TrainingSet, UnusableInput

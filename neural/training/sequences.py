@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from simgap.neural.training.blocks import Block
+from simgap.neural.training.examples import Examples
 from simgap.neural.training.scaling import Scaling
 from simgap.records import Experiment, UnusableInput
 
@@ -18,7 +19,7 @@ FREE = 160
 STARTS = 6400
 
 
-class Sequences:
+class Sequences(Examples):
     """Pieces of experiments: n measured samples to find the state, then a free run of up to `free` samples;
     at most `starts` of them, evenly spread.
 

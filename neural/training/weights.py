@@ -34,7 +34,7 @@ def save(model: Any, folder: Path) -> None:
     (folder / "model.json").write_text(json.dumps(about, indent=1), encoding="utf-8")
 
 
-def load(folder: str | Path) -> Any:
+def load_model(folder: str | Path) -> Any:
     """The network that was saved into a folder. Raises UnusableInput for anything else."""
     folder = Path(folder)
     try:

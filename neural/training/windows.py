@@ -10,11 +10,12 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from simgap.neural.training.blocks import Block
+from simgap.neural.training.examples import Examples
 from simgap.neural.training.scaling import Scaling, features
 from simgap.records import Experiment, UnusableInput
 
 
-class Windows:
+class Windows(Examples):
     """All windows of some experiments: x(k-W) .. x(k-1) with y(k), for every k that has W samples before it.
 
     A window lies within one experiment and is a view. `resident`: the scaled data are held in memory as float32;

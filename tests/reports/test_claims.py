@@ -1,0 +1,131 @@
+import runpy
+from pathlib import Path
+
+import pytest
+
+from simgap.reports.claim_rules import RULES
+from simgap.reports.claims import claims, claims_table
+from simgap.reports.rendering import to_markdown
+
+EXAMPLE = runpy.run_path(str(Path(__file__).with_name("example_paper.py")))
+UNDECIDED = {
+    "models trained on the delta set learn the drift of the measurements, those trained on the contiguous set do not",
+    "SRNN layers stop early because their gradients vanish",
+    "dropout is better avoided in the last one or two layers",
+    "in small networks regularisation is counterproductive",
+    "with much more data, TCNs could be the best of all",
+    "networks need much more data to avoid overfitting",
+}
+NOT_EVEN_THERE = "TCNs reach very low validation losses on both sets"
+NOT_PRINTED = (
+    "the validation loss oscillates without regularisation and is smooth with it (models 5 and 6)",
+    "ARX and ARMAX have very few parameters beside any network",
+)
+PHI, PHI_DOT = "MSE of phi on contiguous set", "MSE of phi_dot on contiguous set"
+REGULARISED = "GRU-LSTM-CONV1D-reg"
+
+
+@pytest.fixture
+def figures():
+    return EXAMPLE["figures"]()
+
+
+def verdicts(*figures):
+    rows = [row for seed, found in enumerate(figures) for row in EXAMPLE["rows"](found, seed)]
+    return {claim.text: claim for claim in claims(rows)}
+
+
+def scaled(label, column, factor):
+    """A change of figures: those of the labels that contain `label`, in the column, times the factor."""
+
+    def change(figures):
+        for name, values in figures.items():
+            if label in name and column in values:
+                values[column] *= factor
+
+    return change
+
+
+# How to make each claim false where it holds on the paper's figures, or true where it does not.
+FLIPS = {
+    "models trained on the delta set are poor on the contiguous set": scaled(" delta", PHI, 0.5),
+    "SRNN layers stop learning earlier than GRU, LSTM and CONV1D layers on average": scaled("SRNN", "best epoch", 1.2),
+    "GRU, LSTM and CONV1D layers are almost equally good on both sets": scaled("GRU", PHI, 1.5),
+    "GRU, LSTM and CONV1D in parallel (models 5 and 6) predict surprisingly well": scaled("GRU-LSTM", PHI_DOT, 9.0),
+    "model 6 predicts best on average on both sets": scaled(REGULARISED, PHI_DOT, 9.0),
+    "dropout and L2 regularisation keep a larger network from overfitting (model 6 against 5)": scaled(
+        REGULARISED, "MSE valid", 1.3
+    ),
+    NOT_PRINTED[0]: scaled(REGULARISED, "rises", 6.0),
+    "decoder and encoder predict comparably well on average": scaled("Decoder", PHI, 5.0),
+    "the decoder is particularly good on phi of the contiguous set": scaled("Decoder", PHI, 1.2),
+    "decoder and encoder are poor on the delta set": scaled("Encoder", "MSE of phi on delta set", 0.4),
+    "TCNs reach very low training losses on both sets": scaled("TCN", "MSE train", 1.5),
+    NOT_EVEN_THERE: scaled("TCN", "MSE valid", 0.5),
+    "on the delta set networks and ARX, ARMAX are quite comparable": scaled("AR", "MSE of phi on delta set", 10.0),
+    "on the contiguous set networks definitely outperform ARX and ARMAX": scaled("ARMAX", PHI, 0.3),
+    NOT_PRINTED[1]: scaled("ARX", "parameters", 100.0),
+}
+
+
+def test_every_claim_is_either_decided_by_a_rule_or_said_to_be_out_of_reach():
+    assert {text for text, _, _ in RULES} == set(FLIPS) | UNDECIDED
+    assert all(rule.__doc__ for _, _, rule in RULES)
+
+
+def test_the_papers_own_figures_bear_out_what_it_claims_but_for_the_validation_losses_of_tcns(figures):
+    for text, claim in verdicts(figures).items():
+        expected = "cannot be told" if text in UNDECIDED else "does not hold" if text == NOT_EVEN_THERE else "holds"
+        assert claim.verdict == expected, claim
+        assert claim.printed == ("cannot be told" if text in NOT_PRINTED else expected)
+
+
+@pytest.mark.parametrize("text", FLIPS)
+def test_a_claim_flips_when_the_figures_flip(text, figures):
+    before = verdicts(figures)[text].verdict
+    FLIPS[text](figures)
+    after = verdicts(figures)[text].verdict
+    assert {before, after} == {"holds", "does not hold"}
+
+
+@pytest.mark.parametrize("text", FLIPS)
+def test_no_claim_is_decided_without_results(text):
+    claim = verdicts()[text]
+    assert claim.verdict == "cannot be told"
+    assert claim.evidence.startswith("there is no figure ")
+
+
+def test_two_seeds_of_three_decide(figures):
+    text, changed = "the decoder is particularly good on phi of the contiguous set", EXAMPLE["figures"]()
+    FLIPS[text](changed)
+    claim = verdicts(figures, changed, figures)[text]
+    assert (claim.verdict, claim.evidence) == ("holds", "rank 1 of 10; 2 of 3 seeds agree")
+    assert verdicts(changed, changed, figures)[text].verdict == "does not hold"
+
+
+def test_seeds_that_disagree_decide_nothing(figures):
+    text, changed = "the decoder is particularly good on phi of the contiguous set", EXAMPLE["figures"]()
+    FLIPS[text](changed)
+    assert verdicts(figures, changed)[text].verdict == "cannot be told"
+
+
+def test_seeds_that_lack_a_model_have_no_vote(figures):
+    text = "the decoder is particularly good on phi of the contiguous set"
+    claim = verdicts(figures, {"Decoder": figures["Decoder"]})[text]
+    assert (claim.verdict, claim.evidence) == ("holds", "rank 1 of 10")
+
+
+def test_a_diverged_network_is_the_last_of_its_column_and_breaks_nothing(figures):
+    figures["Decoder"][PHI] = figures["Decoder delta"][PHI] = float("inf")
+    found = verdicts(figures)
+    assert found["the decoder is particularly good on phi of the contiguous set"].verdict == "does not hold"
+    assert found["model 6 predicts best on average on both sets"].verdict == "holds"
+
+
+def test_the_checklist_shows_verdict_evidence_and_rule(figures):
+    table = claims_table(claims(EXAMPLE["rows"](figures)))
+    assert len(table.rows) == len(RULES)
+    text = to_markdown(table)
+    line = "| SRNN layers stop learning earlier than GRU, LSTM and CONV1D layers on average \\[3\\] | 4.1 | holds |"
+    assert f"{line} mean best epoch 22.5, of the others 24.3 | holds |" in text
+    assert "\\[3\\] The best epoch, averaged over both sets," in text
