@@ -19,6 +19,7 @@ from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
 from simgap.neural.training.loop import History, Recipe, figures, range_test, train
 from simgap.neural.training.scaling import Scaling, features, scalings
+from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
 from simgap.records import TrainingSet, UnusableInput
 
@@ -83,13 +84,14 @@ class Network(ABC):
             progress(epoch, self.epochs)
             writer.write(epoch, history)
 
-        with torch.random.fork_rng(devices=[]):
+        with torch.random.fork_rng(devices=[]), one_thread():
             torch.manual_seed(seed)
             history = train(net, examples, held_out, self.recipe, seed, self.device, checkpoint, tell)
+            scores = figures(net, examples), figures(net, held_out)
         self.trained = net
         self.fitted = {
-            "epochs": len(history.valid), "best_epoch": history.best, "train": figures(net, examples),
-            "valid": figures(net, held_out), "train_loss": history.train, "valid_loss": history.valid,
+            "epochs": len(history.valid), "best_epoch": history.best, "train": scores[0], "valid": scores[1],
+            "train_loss": history.train, "valid_loss": history.valid,
             "seconds_per_epoch": float(np.median(history.seconds)), "device": self.device,
         }  # fmt: skip
         if checkpoint is not None:
@@ -123,7 +125,7 @@ class Network(ABC):
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Free run, in double precision, one experiment after the other."""
         net = copy.deepcopy(self.trained).double()
-        with torch.no_grad():
+        with torch.no_grad(), one_thread():
             return np.stack([self._one(net, *pair) for pair in zip(u, y_init, strict=True)])
 
     def _one(self, net: Block, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
@@ -137,7 +139,8 @@ class Network(ABC):
     def range_test(self, data: TrainingSet, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Learning rates and the losses while the rate grows from batch to batch (paper, 3.4)."""
         examples, _, net = self.prepare(data, seed)
-        rates, losses = range_test(net, examples, self.recipe.batch, seed=seed)
+        with one_thread():
+            rates, losses = range_test(net, examples, self.recipe.batch, seed=seed)
         return rates.numpy().astype(float), losses.numpy().astype(float)
 
     @property
