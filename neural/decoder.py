@@ -13,7 +13,7 @@ from simgap.registry import MODELS
 @MODELS.register("decoder")
 @dataclass
 class Decoder(Network):
-    """LSTM(first) - LSTM(second) - FC(ny), decoder-like; model 7 of the paper, which gives no widths: 16 and 32 here."""
+    """LSTM(first) - LSTM(second) - FC(ny); model 7 of the paper, which gives no widths: 16 and 32 here."""
 
     first: int = 16
     second: int = 32

@@ -13,7 +13,7 @@ from simgap.registry import MODELS
 @MODELS.register("encoder")
 @dataclass
 class Encoder(Network):
-    """LSTM(first) - LSTM(second) - FC(ny), encoder-like; model 8 of the paper, which gives no widths: 32 and 16 here."""
+    """LSTM(first) - LSTM(second) - FC(ny); model 8 of the paper, which gives no widths: 32 and 16 here."""
 
     first: int = 32
     second: int = 16

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simgap.neural.training.blocks import Block, Headed, Parallel, Tcn
@@ -19,8 +20,8 @@ class TCNs(Network):
     """
 
     channels: int = 12
-    kernels: tuple[int, int] = (3, 5)
-    blocks: tuple[int, int] = (4, 3)
+    kernels: Sequence[int] = (3, 5)
+    blocks: Sequence[int] = (4, 3)
     hidden: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:

@@ -14,7 +14,7 @@ INSIDE_A_FIT = ("grey.least_squares", "grey.simulation", "grey.structure")
 
 
 def _modules() -> list[str]:
-    """Every module but the command line, numba kernels (a checked function cannot be compiled) and the inside of a fit."""
+    """Every module but the command line, numba kernels (a checked function cannot be compiled) and a fit's inside."""
     names = []
     for folder, package in FOLDERS.items():
         for path in (ROOT / folder).rglob("*.py"):

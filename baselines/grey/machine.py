@@ -79,9 +79,7 @@ class Machine:
 
         return np.concatenate([of_one(i) for i in range(len(u))])
 
-    def shares(
-        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
-    ) -> Float[np.ndarray, "B T e"]:
+    def shares(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B T e"]:
         """What each effect does to the first output: the simulation less the one without it, from the same start."""
         structure, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         if not structure.terms:

@@ -61,8 +61,10 @@ def _print_model(console: rich.console.Console, done: Fit) -> None:
     size = "" if first.n_params is None else f", parameters: {first.n_params}"
     lines = [f"{first.model} on {first.dataset}: fitted in {first.fit_seconds:.3g} s{size}"]
     if first.fitted:
-        lines.append("chosen: " + ", ".join(
-            f"{name} = {value}" for name, value in first.fitted.items() if not isinstance(value, list)))
+        lines.append(
+            "chosen: "
+            + ", ".join(f"{name} = {value}" for name, value in first.fitted.items() if not isinstance(value, list))
+        )
     summary = getattr(done.model, "summary", None)
     if callable(summary):
         lines.append(str(summary()))

@@ -16,7 +16,7 @@ class _Pass(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, offset: Tensor, dilation: int) -> Tensor:
         values, w = x.detach().numpy(), weight.detach().numpy()
-        batch, steps, channels = values.shape
+        batch, steps, _ = values.shape
         flat = np.ascontiguousarray(w.transpose(2, 1, 0).reshape(-1, len(w)))  # [K C, G]
         columns = np.empty((batch * steps, len(flat)), values.dtype)
         y = np.empty((batch, steps, len(w)), values.dtype)

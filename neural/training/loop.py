@@ -139,7 +139,7 @@ def figures(net: Block, examples: Examples) -> dict[str, float]:
     return {"mse": float(e.square().mean()), "mae": float(e.abs().mean()), "r2": float(explained.mean())}
 
 
-def _errors(net: Block, examples: Examples, device: str):  # noqa: ANN202
+def _errors(net: Block, examples: Examples, device: str):
     net.eval()
     for chosen in torch.arange(len(examples)).split(AT_ONCE):
         x, y = (part.to(device) for part in examples.batch(chosen))

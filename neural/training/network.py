@@ -196,4 +196,3 @@ class _Log:
             for name in ("train", "valid", "rate"):
                 self.writer.add_scalar(name, getattr(history, name)[-1], epoch)
             self.writer.flush()
-

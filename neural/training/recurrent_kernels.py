@@ -1,4 +1,4 @@
-"""The passes of recurrent layers through time, compiled. Arrays are [T, features, B], so that a batch lies side by side.
+"""The passes of recurrent layers through time, compiled; arrays are [T, features, B].
 
 A backward kernel leaves the gradient before the bends in `d` [G H, T, B]; those of all weights are one product of it.
 """

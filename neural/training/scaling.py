@@ -22,7 +22,7 @@ class Scaling:
     half: tuple[float, ...]
 
     @classmethod
-    def of(cls, columns: Sequence[Float[np.ndarray, "T n"]]) -> Scaling:
+    def of(cls, columns: Sequence[Float[np.ndarray, "_ n"]]) -> Scaling:
         """From the extremes of training data; a column that never moves is only shifted."""
         low = np.min([column.min(axis=0) for column in columns], axis=0)
         high = np.max([column.max(axis=0) for column in columns], axis=0)

@@ -74,4 +74,3 @@ def _build(about: dict[str, Any]) -> Any:
         raise UnusableInput(f"a network of {size} weights is larger than any of this kind")
     model.trained = model.net(model.inputs, len(model.of_y.middle))
     return model
-

@@ -39,7 +39,8 @@ class Windows(Examples):
             views = torch.from_numpy(x.astype(np.float32)).unfold(0, window, 1).transpose(1, 2)
             self.held = views, torch.from_numpy(y.astype(np.float32))
             firsts = np.concatenate(([0], np.cumsum([len(e) for e in self.experiments])[:-1]))
-            self.rows = torch.from_numpy(np.concatenate([f + np.arange(n) for f, n in zip(firsts, counts, strict=True)]))
+            rows = [first + np.arange(count) for first, count in zip(firsts, counts, strict=True)]
+            self.rows = torch.from_numpy(np.concatenate(rows))
 
     def __len__(self) -> int:
         return int(self.ends[-1])
@@ -67,9 +68,7 @@ class Windows(Examples):
         return net.last(x)
 
 
-def simulate(
-    net: Block, x: Float[Tensor, "T F"], n: int, window: int, at_once: int = 1024
-) -> Float[Tensor, "T-n ny"]:
+def simulate(net: Block, x: Float[Tensor, "T F"], n: int, window: int, at_once: int = 1024) -> Float[Tensor, "N ny"]:
     """Rows n .. T-1 of one experiment; before its start the inputs stood still."""
     padded = torch.cat((x[:1].expand(max(0, window - n), -1), x[max(0, n - window) : -1]))
     views = padded.unfold(0, window, 1).transpose(1, 2)
