@@ -13,10 +13,10 @@ from simgap.registry import MODELS
 @MODELS.register("decoder")
 @dataclass
 class Decoder(Network):
-    """LSTM(first) - LSTM(second) - FC(ny); model 7 of the paper, which gives no widths: 16 and 32 here."""
+    """LSTM(first) - LSTM(second) - FC(ny); model 7 of the paper, which gives no widths: 8 and 16 here."""
 
-    first: int = 16
-    second: int = 32
+    first: int = 8
+    second: int = 16
 
     def net(self, inputs: int, outputs: int) -> Block:
         """An untrained network with random weights."""

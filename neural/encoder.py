@@ -13,10 +13,10 @@ from simgap.registry import MODELS
 @MODELS.register("encoder")
 @dataclass
 class Encoder(Network):
-    """LSTM(first) - LSTM(second) - FC(ny); model 8 of the paper, which gives no widths: 32 and 16 here."""
+    """LSTM(first) - LSTM(second) - FC(ny); model 8 of the paper, which gives no widths: 16 and 8 here."""
 
-    first: int = 32
-    second: int = 16
+    first: int = 16
+    second: int = 8
 
     def net(self, inputs: int, outputs: int) -> Block:
         """An untrained network with random weights."""

@@ -116,7 +116,8 @@ def _before(x: Float[Tensor, "B T F"], samples: int) -> Float[Tensor, "B T F"]:
 
 
 def _mean_of_two(x: Float[Tensor, "B T F"]) -> Float[Tensor, "B S F"]:
-    return x.unflatten(1, (-1, 2)).mean(2)
+    first, second = x.unflatten(1, (-1, 2)).unbind(2)
+    return torch.lerp(first, second, 0.5)
 
 
 def full(inputs: int, outputs: int) -> nn.Linear:
