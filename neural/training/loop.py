@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -16,8 +16,9 @@ from simgap.neural.training.blocks import Block
 from simgap.neural.training.checkpoints import Checkpoint
 from simgap.neural.training.examples import Examples
 
-# Windows or pieces whose error is computed at once.
+# Windows or pieces whose error is computed at once, and in all; the paper's gimbal has 24,160 windows.
 AT_ONCE = 512
+JUDGED = 30_000
 
 
 class NotANumber(ArithmeticError):
@@ -123,32 +124,26 @@ def _shuffled(examples: int, recipe: Recipe, order: torch.Generator) -> tuple[Te
 
 def error(net: Block, examples: Examples, device: str = "cpu") -> float:
     """Mean square of the errors on scaled data, without dropout."""
-    return sum(float(e.square().sum()) for e in _errors(net, examples, device)) / _numbers(net, examples)
+    return float(torch.cat([(answer - y).square().flatten() for answer, y in _answers(net, examples, device)]).mean())
 
 
 def figures(net: Block, examples: Examples) -> dict[str, float]:
     """MSE, MAE and R2 on scaled data; R2 is the mean over the outputs, as in scikit-learn and Keras."""
-    errors, targets = [], []
-    for chosen in torch.arange(len(examples)).split(AT_ONCE):
-        x, y = examples.batch(chosen)
-        with torch.no_grad():
-            errors.append((examples.answer(net, x) - y).flatten(0, -2))
-        targets.append(y.flatten(0, -2))
-    e, y = torch.cat(errors).double(), torch.cat(targets).double()
+    answers, targets = zip(*_answers(net, examples), strict=True)
+    y = torch.cat([part.flatten(0, -2) for part in targets]).double()
+    e = torch.cat([part.flatten(0, -2) for part in answers]).double() - y
     explained = 1 - e.square().sum(0) / (y - y.mean(0)).square().sum(0).clamp(min=1e-300)
     return {"mse": float(e.square().mean()), "mae": float(e.abs().mean()), "r2": float(explained.mean())}
 
 
-def _errors(net: Block, examples: Examples, device: str):
+def _answers(net: Block, examples: Examples, device: str = "cpu") -> Iterator[tuple[Tensor, Tensor]]:
+    """What the network says and what is right, of all examples or of so many, evenly spread."""
     net.eval()
-    for chosen in torch.arange(len(examples)).split(AT_ONCE):
-        x, y = (part.to(device) for part in examples.batch(chosen))
+    chosen = torch.linspace(0, len(examples) - 1, min(len(examples), JUDGED), dtype=torch.double).round().long()
+    for part in chosen.split(AT_ONCE):
+        x, y = (values.to(device) for values in examples.batch(part))
         with torch.no_grad():
-            yield examples.answer(net, x) - y
-
-
-def _numbers(net: Block, examples: Examples) -> int:
-    return len(examples) * examples.batch(torch.tensor([0]))[1].numel()
+            yield examples.answer(net, x), y
 
 
 def _hopeless(history: History, recipe: Recipe) -> bool:

@@ -23,7 +23,7 @@ from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
 from simgap.records import TrainingSet, UnusableInput
 
-STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=50)
+STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=40)
 # Free runs of held-out data on which the best epoch is chosen: samples of each, and how many.
 HELD_OUT = (1000, 32)
 

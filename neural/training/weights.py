@@ -60,7 +60,7 @@ def _build(about: dict[str, Any]) -> Any:
     kind = MODELS[str(about["model"])]
     if not (isinstance(kind, type) and issubclass(kind, Network)):
         raise UnusableInput(f"{about['model']} is no network")
-    model = kind(**about["params"])
+    model = kind(**(about["params"] | {"device": "cpu", "log": ""}))
     model.check()
     model.dt, model.fitted = float(about["dt"]), dict(about["fitted"])
     model.of_x, model.of_y = (
