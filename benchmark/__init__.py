@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from simgap.data import Missing, describe, fetch, load, save
     from simgap.diagnosis.diagnose import diagnose
-    from simgap.fitting import Fit, fit
-    from simgap.neural.training.weights import load_model
+    from simgap.fitting import Fit, fit, load_model
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
@@ -22,8 +21,7 @@ __version__ = "0.1.0"
 _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
     "simgap.diagnosis.diagnose": ("diagnose",),
-    "simgap.fitting": ("Fit", "fit"),
-    "simgap.neural.training.weights": ("load_model",),
+    "simgap.fitting": ("Fit", "fit", "load_model"),
     "simgap.protocol": ("Model",),
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import time
 import traceback
 import warnings
@@ -22,6 +23,9 @@ from simgap.registry import MODELS, load_class
 from simgap.store import plain
 from simgap.tasks import TASKS, USUAL, Task, Trial
 from simgap.workers import threads_per_worker
+
+# Bytes of a model.json.
+LARGEST_DESCRIPTION = 1 << 20
 
 
 class ModelFault(Exception):
@@ -61,6 +65,25 @@ def fit(
     )  # fmt: skip
     about = fit_model(built, dataset.training, about)
     return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
+
+
+def load_model(folder: str | Path) -> Any:
+    """The network that its `save` or `simgap fit --save` wrote into a folder. Nothing in the files is executed.
+
+    Raises UnusableInput.
+    """
+    file = Path(folder) / "model.json"
+    try:
+        if file.stat().st_size > LARGEST_DESCRIPTION:
+            raise UnusableInput(f"{file} is larger than any description of a model")
+        about = json.loads(file.read_text(encoding="utf-8"))
+        kind = MODELS[str(about["model"])]
+        load = kind.load
+    except UnusableInput:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise UnusableInput(f"{folder} holds no network of simgap: {' '.join(str(error).split())[:200]}") from error
+    return load(Path(folder), about)
 
 
 def model_class(reference: str) -> type:

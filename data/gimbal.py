@@ -59,6 +59,12 @@ def gimbal() -> Dataset:
     return gimbal_dataset()
 
 
+@DATASETS.register("gimbal_short")
+def gimbal_short() -> Dataset:
+    """The gimbal's first 8 experiments to train, 2 to validate and 2 to test, of 20 s each: for a quick look."""
+    return gimbal_dataset(n_train=8, n_valid=2, n_test=2, seconds=(20.0, 20.0, 20.0), name="gimbal_short")
+
+
 def gimbal_dataset(
     parameters: Gimbal = DEFAULT,
     seed: int = 0,

@@ -10,6 +10,7 @@ import pandas as pd
 from simgap import store
 from simgap.records import Result, UnusableInput
 from simgap.reports.claims import claims, claims_table
+from simgap.reports.modes import modes_table
 from simgap.reports.paper import of_paper, paper_tables
 from simgap.reports.published import published_markdown
 from simgap.reports.rendering import escape, to_markdown
@@ -51,7 +52,8 @@ def report(folder: str | Path = "results") -> Report:
 
 def tables_of(results: list[Result]) -> list[Table]:
     """The paper's tables and claims if these are results of its suite, the overview, then each data set's table."""
-    return [*_of_paper(results), overview(results), *_of_datasets(results)]
+    modes = modes_table(results)
+    return [*_of_paper(results), overview(results), *([modes] if modes else []), *_of_datasets(results)]
 
 
 def brief(results: list[Result]) -> list[Table]:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import catalogue, data, diagnosing, fitting, reporting, running
+from simgap.cli import catalogue, data, diagnosing, fitting, ranging, reporting, running
 from simgap.records import UnusableInput
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -18,6 +18,7 @@ app.command("report")(reporting.report)
 app.command("list")(catalogue.show)
 app.command("diagnose")(diagnosing.diagnose)
 app.command("fit")(fitting.fit)
+app.command("range-test")(ranging.range_test)
 app.add_typer(data.app, name="data")
 
 

@@ -152,6 +152,11 @@ class Network(ABC):
         """Write weights.safetensors and model.json; `simgap.load_model` reads them."""
         weights.save(self, Path(folder))
 
+    @classmethod
+    def load(cls, folder: Path, about: dict[str, Any]) -> Any:
+        """The model that `save` wrote, of which `about` is what model.json holds. Raises UnusableInput."""
+        return weights.load(cls, folder, about)
+
     def hyper_parameters(self) -> dict[str, Any]:
         """The fields that one may choose."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.init}
