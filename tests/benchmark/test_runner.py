@@ -1,10 +1,13 @@
+import json
 import math
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from safetensors import safe_open
 
 import simgap
 from simgap import store
@@ -195,9 +198,9 @@ def test_a_script_without_a_main_guard_runs_once(suite, tmp_path):
 COMMAND = [sys.executable, "-c", "import sys; from simgap.cli import main; sys.exit(main())", "run"]
 
 
-def wait_for(path):
-    deadline = time.monotonic() + 30
-    while not path.exists() or not path.stat().st_size:
+def wait_for(path, there=lambda path: path.exists() and path.stat().st_size):
+    deadline = time.monotonic() + 60
+    while not there(path):
         assert time.monotonic() < deadline, f"{path} did not appear"
         time.sleep(0.05)
 
@@ -225,3 +228,22 @@ def test_the_workers_of_a_killed_run_end_too(suite, tmp_path):
     beats = (tmp_path / "beats.txt").stat().st_size
     time.sleep(0.5)
     assert (tmp_path / "beats.txt").stat().st_size == beats
+
+
+def test_a_killed_training_carries_on_from_its_last_epoch(suite, tmp_path):
+    out = tmp_path / "out"
+    head = Path(suite()).read_text()
+    slow = tmp_path / "slow.toml"
+    slow.write_text(head + '[[models]]\nname = "gru"\nparams = { units = 4, epochs = 400, batches = 20 }\n')
+    with subprocess.Popen([*COMMAND, str(slow), "--out", str(out)], stdout=subprocess.DEVNULL) as process:
+        wait_for(out / ".checkpoints", lambda folder: any(folder.glob("*.safetensors")))
+        process.kill()
+    (checkpoint,) = (out / ".checkpoints").glob("*.safetensors")
+    with safe_open(checkpoint, "np") as file:
+        known = json.loads(file.metadata()["history"])["train"]
+    assert 0 < len(known) < 400
+    shares = []
+    row = simgap.run(str(slow), out=out, progress=lambda progress: shares.append(progress.share))[0]
+    assert row.fitted["train_loss"][: len(known)] == known
+    assert any(0 < share < 1 for share in shares)  # of the one job, while it was under way
+    assert not list((out / ".checkpoints").iterdir())

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simgap.records import Channels, Experiment, UnusableInput
-from simgap.tasks import Forecast, FreeRun, Trial
+from simgap.tasks import Differences, Forecast, FreeRun, Trial
 
 CHANNELS = Channels.unnamed(1, 1)
 
@@ -72,3 +72,10 @@ def test_both_tasks_share_one_free_run():
 def test_horizons_that_do_not_increase_from_one_are_refused(horizons):
     with pytest.raises(UnusableInput, match="must start at 1"):
         Forecast(horizons=horizons)
+
+
+def test_differences_start_at_the_last_measured_sample():
+    run = trial(20)
+    figures = Differences().score(run).metrics["y0"]
+    assert figures["n_scored"] == 17
+    assert figures["rmse"] == pytest.approx(1.0)  # held differences are zero, those of the ramp are one

@@ -59,11 +59,21 @@ def compare(benchmark) -> Callable[..., None]:
         mine, other = benchmark.stats["median"], statistics.median(seconds)
         ratio = other / mine
         benchmark.extra_info.update(task=task, peer=name, peer_median=other, ratio=ratio, limit=limit)
-        goal = "" if limit is None else f"{limit}"
-        ROWS.append(f"| {task} | {1e3 * mine:.3g} | {name} | {1e3 * other:.4g} | {ratio:.0f} | {goal} |")
+        _add_row(task, mine, name, other, limit)
         assert limit is None or ratio >= limit, f"{task}: {ratio:.0f} times {name}, the limit is {limit}"
 
     return run
+
+
+def _add_row(task: str, mine: float, name: str, other: float, limit: int | None) -> None:
+    goal = "" if limit is None else f"{limit}"
+    ROWS.append(f"| {task} | {1e3 * mine:.3g} | {name} | {1e3 * other:.4g} | {other / mine:.3g} | {goal} |")
+
+
+@pytest.fixture(scope="session")
+def row() -> Callable[..., None]:
+    """Adds a line to the table: task, our seconds, peer, its seconds, limit of the ratio."""
+    return _add_row
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,82 @@
+"""Epochs of training next to Keras: the same layers, widths, initial weights, optimiser, batches and windows."""
+
+import statistics
+from time import perf_counter
+
+import numpy as np
+import pytest
+import torch
+
+from simgap.data import load
+from simgap.neural.training.loop import Recipe, train
+from simgap.registry import MODELS
+
+EPOCHS, SEEDS = 3, 2
+RECIPE = Recipe(epochs=EPOCHS, batch=32, learning_rate=1e-4, patience=100, early_stop=100)
+
+
+@pytest.fixture(scope="module")
+def keras():
+    tensorflow = pytest.importorskip("tensorflow", reason="Keras is not installed: make peers")
+    tensorflow.config.threading.set_intra_op_parallelism_threads(0)  # as many as there are cores
+    return tensorflow.keras
+
+
+def body_of(keras, name, x):
+    layers, model = keras.layers, MODELS[name]
+    if name in ("srnn", "gru", "lstm"):
+        kind = {"srnn": layers.SimpleRNN, "gru": layers.GRU, "lstm": layers.LSTM}[name]
+        return kind(model.units)(x)
+    if name == "conv1d":
+        for _ in range(2):
+            x = layers.Conv1D(model.channels, model.kernel, padding="causal", activation="relu")(x)
+            x = layers.AveragePooling1D(2)(x)
+        return layers.Dense(model.channels, activation="relu")(layers.Flatten()(x))
+    for level in range(model.blocks):
+        inner = x
+        for _ in range(2):
+            inner = layers.Conv1D(
+                model.channels, model.kernel, padding="causal", dilation_rate=2**level, activation="relu"
+            )(inner)
+        skip = x if level else layers.Dense(model.channels)(x)
+        x = layers.ReLU()(layers.Add()([inner, skip]))
+    return x[:, -1]
+
+
+@pytest.mark.parametrize("name", ["srnn", "gru", "lstm", "conv1d", "tcn"])
+def test_an_epoch_next_to_keras(name, keras, note, row):
+    data = load("gimbal").training
+    ours, theirs, losses = [], [], []
+    for seed in range(SEEDS):
+        examples, held_out, net = MODELS[name](mode="windowed").prepare(data, seed)
+        x, y = (part.numpy() for part in examples.batch(torch.arange(len(examples))))
+        validation = tuple(part.numpy() for part in held_out.batch(torch.arange(len(held_out))))
+        keras.utils.set_random_seed(seed)
+        given = keras.Input(x.shape[1:])
+        model = keras.Model(given, keras.layers.Dense(y.shape[1])(body_of(keras, name, given)))
+        model.compile(keras.optimizers.Adam(1e-4), "mse")
+        assert model.count_params() == pytest.approx(sum(p.numel() for p in net.parameters()), rel=0.05)
+        model.train_on_batch(x[:32], y[:32])  # traces the graph
+        model.evaluate(*validation, batch_size=512, verbose=0)
+        loss = []
+
+        def theirs_too(epoch, history, model=model, data=(x, y), held_out=validation, loss=loss):
+            start = perf_counter()
+            known = model.fit(*data, batch_size=32, epochs=1, verbose=0, validation_data=held_out,
+                              validation_batch_size=512)  # fmt: skip
+            theirs.append(perf_counter() - start)
+            loss.append(known.history["val_loss"][-1])
+
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)
+        history = train(net, examples, held_out, RECIPE, seed, tell=theirs_too)
+        torch.set_num_threads(threads)
+        ours += history.seconds
+        losses.append((history.valid[-1], loss[-1]))
+    mine, other = statistics.median(ours), statistics.median(theirs)
+    ratio = other / mine
+    mine_loss, other_loss = np.mean(losses, axis=0)
+    row(f"epoch of {name}, batch 32", mine, "Keras on TensorFlow", other, 3)
+    note(f"{name}: validation loss after {EPOCHS} epochs {mine_loss:.5f}, Keras {other_loss:.5f}, {SEEDS} seeds.")
+    assert ratio >= 3, f"{name}: {ratio:.1f} times Keras"
+    assert mine_loss <= 1.05 * other_loss
