@@ -9,6 +9,7 @@ import torch
 
 from simgap.data import load
 from simgap.neural.training.loop import Recipe, train
+from simgap.neural.training.threads import one_thread
 from simgap.registry import MODELS
 
 EPOCHS, SEEDS = 3, 2
@@ -67,10 +68,8 @@ def test_an_epoch_next_to_keras(name, keras, note, row):
             theirs.append(perf_counter() - start)
             loss.append(known.history["val_loss"][-1])
 
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)
-        history = train(net, examples, held_out, RECIPE, seed, tell=theirs_too)
-        torch.set_num_threads(threads)
+        with one_thread():  # as `fit` does; Keras has threads of its own
+            history = train(net, examples, held_out, RECIPE, seed, tell=theirs_too)
         ours += history.seconds
         losses.append((history.valid[-1], loss[-1]))
     mine, other = statistics.median(ours), statistics.median(theirs)
