@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from simgap.neural.training.convolution import Convolution
+from simgap.neural.training.convolution import Convolution, Residual, full
 from simgap.neural.training.recurrent import Layer
 
 
@@ -68,64 +68,35 @@ class Pooled(Block):
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
         """Features of the window, of which a remainder of fewer than four samples is left out at its start."""
-        x = _mean_of_two(self.first.over(x[:, x.shape[1] % 4 :]))
-        x = _mean_of_two(self.second.over(x))
+        x = self.second.pooled(self.first.pooled(x[:, x.shape[1] % 4 :]))
         weight = self.full.weight.transpose(1, 2).flatten(1)
         return torch.relu(nn.functional.linear(x.flatten(1), weight, self.full.bias))
 
 
 class Tcn(Block):
-    """Temporal convolutional network: residual blocks of two dilated causal convolutions (Bai, Kolter, Koltun 2018).
-
-    y = ReLU(x + F(x)), F = conv - ReLU - dropout - conv - ReLU - dropout, dilation 1, 2, 4, ... from block to block;
-    the input passes through a 1 x 1 convolution on its way around the first block.
-    """
+    """Temporal convolutional network: residual blocks of dilation 1, 2, 4, ... (Bai, Kolter and Koltun 2018)."""
 
     def __init__(self, inputs: int, channels: int, kernel: int, blocks: int, dropout: float = 0.0) -> None:
         super().__init__()
         sizes = [inputs] + [channels] * (blocks - 1)
-        self.one = nn.ModuleList(Convolution(size, channels, kernel) for size in sizes)
-        self.two = nn.ModuleList(Convolution(channels, channels, kernel) for _ in sizes)
-        self.through = full(inputs, channels)
-        self.dropout = nn.Dropout(dropout)
+        self.blocks = nn.ModuleList(Residual(size, channels, kernel, dropout) for size in sizes)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """Features at all samples; before the start there are zeros."""
-        for level in range(len(self.one)):
-            x = self._block(x, level, 2**level)
+        for level, block in enumerate(self.blocks):
+            x = block.over(x, 2**level)
         return x
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
         """The same at the last sample: a block of dilation d needs every d-th sample only, counted from the end."""
-        for level in range(len(self.one)):
-            if level:
-                x = x[:, (x.shape[1] - 1) % 2 :: 2]
-            x = self._block(x, level, 1)
+        for level, block in enumerate(self.blocks):
+            x = block.over(x, step=2 if level else 1)
         return x[:, -1]
-
-    def _block(self, x: Tensor, level: int, dilation: int) -> Tensor:
-        inner = x
-        for convolution in (self.one[level], self.two[level]):
-            inner = self.dropout(convolution.over(inner, dilation))
-        return torch.relu(inner + (x if level else self.through(x)))
 
 
 def _before(x: Float[Tensor, "B T F"], samples: int) -> Float[Tensor, "B T F"]:
     """The signal so many samples earlier, zero before its start."""
     return nn.functional.pad(x, (0, 0, samples, 0))[:, : x.shape[1]]
-
-
-def _mean_of_two(x: Float[Tensor, "B T F"]) -> Float[Tensor, "B S F"]:
-    first, second = x.unflatten(1, (-1, 2)).unbind(2)
-    return torch.lerp(first, second, 0.5)
-
-
-def full(inputs: int, outputs: int) -> nn.Linear:
-    """A fully connected layer with the initial weights of Keras: Glorot uniform, offsets zero."""
-    layer = nn.Linear(inputs, outputs)
-    nn.init.xavier_uniform_(layer.weight)
-    nn.init.zeros_(layer.bias)
-    return layer
 
 
 class Headed(Block):

@@ -61,13 +61,14 @@ class History:
 
 def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
     """Adam, whose weight decay is 2 l2: the gradient of l2 w^2."""
-    punished = [
-        p for m in net.modules() if isinstance(m, nn.RNNBase | nn.Conv1d) for name, p in m.named_parameters()
-        if not name.startswith("weight_hh")
-    ]  # fmt: skip
-    chosen = {id(p) for p in punished}
-    rest = [p for p in net.parameters() if id(p) not in chosen]
-    groups = [{"params": punished, "weight_decay": 2 * recipe.l2}, {"params": rest}]
+    punished = {
+        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d)
+        for name, p in m.named_parameters() if not name.startswith("weight_hh")
+    }  # fmt: skip
+    groups = [
+        {"params": [p for p in net.parameters() if id(p) in punished], "weight_decay": 2 * recipe.l2},
+        {"params": [p for p in net.parameters() if id(p) not in punished]},
+    ]
     return torch.optim.Adam([g for g in groups if g["params"]], lr=recipe.learning_rate, fused=True)
 
 

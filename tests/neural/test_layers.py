@@ -5,7 +5,7 @@ import torch
 from torch import nn
 
 from simgap.neural.training.blocks import Parallel, Pooled, Recurrences, Tcn
-from simgap.neural.training.convolution import Convolution
+from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn, recurrent
 
 
@@ -39,6 +39,33 @@ def test_a_convolution_is_that_of_pytorch_with_zeros_before_the_start(dilation):
     padded = nn.functional.pad(x.transpose(1, 2), (3 * dilation, 0))
     theirs = torch.relu(nn.functional.conv1d(padded, layer.weight, layer.bias, dilation=dilation)).transpose(1, 2)
     ours = layer.over(x, dilation)
+    torch.testing.assert_close(ours, theirs)
+    parts = [x, layer.weight, layer.bias]
+    torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
+
+
+@pytest.mark.parametrize(("inputs", "step", "dilation"), [(3, 1, 1), (5, 1, 4), (5, 2, 1), (3, 2, 2)])
+def test_a_residual_block_is_two_convolutions_and_a_way_around(inputs, step, dilation):
+    torch.manual_seed(0)
+    block = Residual(inputs, 5, 3, dropout=0.5).double()
+    for p in block.parameters():
+        nn.init.uniform_(p, -0.7, 0.7)
+    x = torch.randn(2, 13, inputs, dtype=torch.double, requires_grad=True)
+    block.eval()  # the pass of its own; with dropout it is made of PyTorch's operations
+    ours = block.over(x, dilation, step)
+    kept = x[:, (13 - 1) % step :: step]
+    inner = block.two.over(block.one.over(kept, dilation), dilation)
+    theirs = torch.relu(inner + (kept if block.through is None else block.through(kept)))
+    torch.testing.assert_close(ours, theirs)
+    parts = [x, *block.parameters()]
+    torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
+
+
+def test_pooling_takes_the_mean_of_two_samples():
+    torch.manual_seed(0)
+    layer = Convolution(3, 5, 4).double()
+    x = torch.randn(2, 12, 3, dtype=torch.double, requires_grad=True)
+    ours, theirs = layer.pooled(x), layer.over(x).unflatten(1, (-1, 2)).mean(2)
     torch.testing.assert_close(ours, theirs)
     parts = [x, layer.weight, layer.bias]
     torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
