@@ -87,12 +87,12 @@ class Residual(nn.Module):
     def over(self, x: Float[Tensor, "B T F"], dilation: int = 1, step: int = 1) -> Float[Tensor, "B S G"]:
         """The block over a sequence."""
         if x.device.type == "cpu" and not (self.training and self.dropout.p):
-            none = torch.empty(0, 0, dtype=x.dtype)
-            around = (
-                (none, none[0:0, 0:0].flatten()) if self.through is None else (self.through.weight, self.through.bias)
-            )
-            convolutions = (self.one.weight, self.one.bias, self.two.weight, self.two.bias)
-            return _Residual.apply(x.contiguous(), step, dilation, *convolutions, *around)  # type: ignore[no-any-return]
+            weights = [self.one.weight, self.one.bias, self.two.weight, self.two.bias]
+            if self.through is None:
+                weights += [x.new_empty(0, 0), x.new_empty(0)]
+            else:
+                weights += [self.through.weight, self.through.bias]
+            return _Residual.apply(x.contiguous(), step, dilation, *weights)  # type: ignore[no-any-return]
         x = x[:, (x.shape[1] - 1) % step :: step]
         inner = x
         for convolution in (self.one, self.two):

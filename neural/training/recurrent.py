@@ -106,12 +106,12 @@ class Lstm(Layer, nn.LSTM):
 def recurrent(layer: type[Net], inputs: int, units: int) -> Net:
     """A layer with the initial weights of Keras.
 
-    Glorot uniform from the input, orthogonal from the state, offsets zero but that of a forget gate, which is one.
+    Glorot uniform from the input, orthogonal from the state with all gates together, offsets zero but that of a
+    forget gate, which is one.
     """
     made = layer(inputs, units, batch_first=True)
     nn.init.xavier_uniform_(made.weight_ih_l0)
-    for gate in made.weight_hh_l0.data.split(units):
-        nn.init.orthogonal_(gate)
+    nn.init.orthogonal_(made.weight_hh_l0)
     nn.init.zeros_(made.bias_ih_l0)
     nn.init.zeros_(made.bias_hh_l0)
     if isinstance(made, nn.LSTM):

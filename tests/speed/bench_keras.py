@@ -12,7 +12,7 @@ from simgap.neural.training.loop import Recipe, train
 from simgap.neural.training.threads import one_thread
 from simgap.registry import MODELS
 
-EPOCHS, SEEDS = 3, 2
+EPOCHS, SEEDS = 3, 3
 RECIPE = Recipe(epochs=EPOCHS, batch=32, learning_rate=1e-4, patience=100, early_stop=100)
 
 
