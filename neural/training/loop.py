@@ -16,9 +16,11 @@ from simgap.neural.training.blocks import Block
 from simgap.neural.training.checkpoints import Checkpoint
 from simgap.neural.training.examples import Examples
 
-# Windows or pieces whose error is computed at once, and in all; the paper's gimbal has 24,160 windows.
+# Windows or pieces whose error is computed at once, after an epoch, and at the end: the paper's 24,160 to train on and
+# 5,400 to validate on are all among them.
 AT_ONCE = 512
-JUDGED = 30_000
+AFTER_AN_EPOCH = 6000
+AT_THE_END = 30_000
 
 
 class NotANumber(ArithmeticError):
@@ -125,22 +127,26 @@ def _shuffled(examples: int, recipe: Recipe, order: torch.Generator) -> tuple[Te
 
 def error(net: Block, examples: Examples, device: str = "cpu") -> float:
     """Mean square of the errors on scaled data, without dropout."""
-    return float(torch.cat([(answer - y).square().flatten() for answer, y in _answers(net, examples, device)]).mean())
+    return float(
+        torch.cat(
+            [(answer - y).square().flatten() for answer, y in _answers(net, examples, AFTER_AN_EPOCH, device)]
+        ).mean()
+    )
 
 
 def figures(net: Block, examples: Examples) -> dict[str, float]:
     """MSE, MAE and R2 on scaled data; R2 is the mean over the outputs, as in scikit-learn and Keras."""
-    answers, targets = zip(*_answers(net, examples), strict=True)
+    answers, targets = zip(*_answers(net, examples, AT_THE_END), strict=True)
     y = torch.cat([part.flatten(0, -2) for part in targets]).double()
     e = torch.cat([part.flatten(0, -2) for part in answers]).double() - y
     explained = 1 - e.square().sum(0) / (y - y.mean(0)).square().sum(0).clamp(min=1e-300)
     return {"mse": float(e.square().mean()), "mae": float(e.abs().mean()), "r2": float(explained.mean())}
 
 
-def _answers(net: Block, examples: Examples, device: str = "cpu") -> Iterator[tuple[Tensor, Tensor]]:
-    """What the network says and what is right, of all examples or of so many, evenly spread."""
+def _answers(net: Block, examples: Examples, at_most: int, device: str = "cpu") -> Iterator[tuple[Tensor, Tensor]]:
+    """What the network says and what is right, of all examples or of `at_most`, evenly spread."""
     net.eval()
-    chosen = torch.linspace(0, len(examples) - 1, min(len(examples), JUDGED), dtype=torch.double).round().long()
+    chosen = torch.linspace(0, len(examples) - 1, min(len(examples), at_most), dtype=torch.double).round().long()
     for part in chosen.split(AT_ONCE):
         x, y = (values.to(device) for values in examples.batch(part))
         with torch.no_grad():

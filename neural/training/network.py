@@ -26,6 +26,8 @@ from simgap.records import TrainingSet, UnusableInput
 STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=40)
 # Free runs of held-out data on which the best epoch is chosen: samples of each, and how many.
 HELD_OUT = (1000, 32)
+# Samples that are simulated at once.
+AT_ONCE = 20_000
 
 
 @dataclass
@@ -123,15 +125,17 @@ class Network(ABC):
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """Free run, in double precision, one experiment after the other."""
+        """Free run, in double precision."""
         net = copy.deepcopy(self.trained).double()
+        at_once = max(1, AT_ONCE // u.shape[1])
         with torch.no_grad(), one_thread():
-            return np.stack([self._one(net, *pair) for pair in zip(u, y_init, strict=True)])
+            parts = [self._some(net, u[i : i + at_once], y_init[i : i + at_once]) for i in range(0, len(u), at_once)]
+        return np.concatenate(parts)
 
-    def _one(self, net: Block, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
-        x = torch.from_numpy(self.of_x.inside(features(u, self.dt, self.windowed)))
+    def _some(self, net: Block, u: np.ndarray, y_init: np.ndarray) -> np.ndarray:
+        x = torch.from_numpy(self.of_x.inside(np.stack([features(one, self.dt, self.windowed) for one in u])))
         if self.windowed:
-            y_hat = windows.simulate(net, x, len(y_init), self.window)
+            y_hat = windows.simulate(net, x, y_init.shape[1], self.window)
         else:
             y_hat = sequences.simulate(net, x, torch.from_numpy(self.of_y.inside(y_init)))
         return self.of_y.outside(y_hat.numpy())

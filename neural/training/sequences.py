@@ -68,6 +68,6 @@ def started(u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Ten
     return torch.cat((u, torch.nn.functional.pad(known, (0, 0, 0, rest))), dim=2)
 
 
-def simulate(net: Block, u: Float[Tensor, "T nu"], y: Float[Tensor, "n ny"]) -> Float[Tensor, "N ny"]:
-    """Rows n .. T-1 of one experiment from its n measured samples."""
-    return net(started(u[None], y[None]))[0, len(y) :]
+def simulate(net: Block, u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Tensor, "B N ny"]:
+    """Rows n .. T-1 of B experiments from their n measured samples."""
+    return net(started(u, y))[:, y.shape[1] :]

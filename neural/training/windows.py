@@ -68,8 +68,12 @@ class Windows(Examples):
         return net.last(x)
 
 
-def simulate(net: Block, x: Float[Tensor, "T F"], n: int, window: int, at_once: int = 1024) -> Float[Tensor, "N ny"]:
-    """Rows n .. T-1 of one experiment; before its start the inputs stood still."""
-    padded = torch.cat((x[:1].expand(max(0, window - n), -1), x[max(0, n - window) : -1]))
-    views = padded.unfold(0, window, 1).transpose(1, 2)
-    return torch.cat([net.last(part) for part in views.split(at_once)])
+def simulate(
+    net: Block, x: Float[Tensor, "B T F"], n: int, window: int, at_once: int = 1024
+) -> Float[Tensor, "B N ny"]:
+    """Rows n .. T-1 of B experiments; before their start the inputs stood still."""
+    before = x[:, :1].expand(-1, max(0, window - n), -1)
+    padded = torch.cat((before, x[:, max(0, n - window) : -1]), dim=1)
+    views = padded.unfold(1, window, 1).transpose(2, 3)  # [B, N, W, F]
+    flat = views.reshape(-1, *views.shape[2:]) if len(x) > 1 else views[0]
+    return torch.cat([net.last(part) for part in flat.split(at_once)]).unflatten(0, views.shape[:2])
