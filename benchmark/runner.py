@@ -5,10 +5,8 @@ from __future__ import annotations
 import contextlib
 import logging
 import multiprocessing
-import signal
 import sys
 import tempfile
-import threading
 import types
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -98,7 +96,7 @@ def _execute_all(
     """The results of each job, in the order in which they end."""
     if not todo:
         return
-    with _main_left_alone(), _interrupts() as interrupted, contextlib.ExitStack() as stack:
+    with _main_left_alone(), contextlib.ExitStack() as stack:
         notes = stack.enter_context(tempfile.TemporaryDirectory(prefix="simgap"))
         context = multiprocessing.get_context("spawn")
         given = (threads, folders | {"SIMGAP_PROGRESS": notes})
@@ -108,8 +106,6 @@ def _execute_all(
         pending: dict[Future, Job] = {pool.schedule(execute, (job,), timeout=timeout): job for job in todo}
         while pending:
             ended, _ = wait(pending, timeout=0.3, return_when=FIRST_COMPLETED)
-            if interrupted:
-                raise KeyboardInterrupt
             for future in ended:
                 job = pending.pop(future)
                 rows = _outcome(future, job, timeout)
@@ -158,25 +154,6 @@ def _main_left_alone() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
-
-
-@contextlib.contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """Every Ctrl-C is noted, because Python swallows one that arrives while a destructor runs."""
-    noted: list[int] = []
-
-    def note(number: int, frame: types.FrameType | None) -> None:
-        noted.append(number)
-        raise KeyboardInterrupt
-
-    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # only the main thread may have it
-    if ours and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, note)
-    try:
-        yield noted
-    finally:
-        if signal.getsignal(signal.SIGINT) is note:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _log_notes(progress: Progress) -> None:

@@ -61,7 +61,10 @@ def gimbal() -> Dataset:
 
 @DATASETS.register("gimbal_short")
 def gimbal_short() -> Dataset:
-    """The gimbal's first 8 experiments to train, 2 to validate and 2 to test, of 20 s each: for a quick look."""
+    """Twelve short recordings of the simulated gimbal, for a quick look and for tests.
+
+    The first 8 experiments to train, 2 to validate and 2 to test of the same plan, of 20 s each; else as `gimbal`.
+    """
     return gimbal_dataset(n_train=8, n_valid=2, n_test=2, seconds=(20.0, 20.0, 20.0), name="gimbal_short")
 
 

@@ -195,7 +195,9 @@ def test_a_script_without_a_main_guard_runs_once(suite, tmp_path):
     assert done.stderr == ""
 
 
-COMMAND = [sys.executable, "-c", "import sys; from simgap.cli import main; sys.exit(main())", "run"]
+# A shell that runs the tests in the background has told its children to ignore Ctrl-C.
+HEARS_CTRL_C = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+COMMAND = [sys.executable, "-c", HEARS_CTRL_C + "from simgap.cli import main; sys.exit(main())", "run"]
 
 
 def wait_for(path, there=lambda path: path.exists() and path.stat().st_size):
