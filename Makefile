@@ -52,7 +52,7 @@ $(VENV)/peers-$(VERSION): requirements-peers.lock $(INSTALLED)
 
 test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
-	@$(BIN)/python -m pytest -q -m "not slow"
+	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
 
 test-slow: peers
 	@$(BIN)/python -m pytest -q -m slow
