@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
     from simgap.fitting import Fit
     from simgap.records import Result
+
+# Longer lists, such as a loss per epoch, are for machines.
+MANY = 8
 
 
 def fit(
@@ -40,7 +44,8 @@ def fit(
         raise UnusableInput(f"--save: {model} is no network, and only networks have weights to save")
     console = Console()
     try:
-        done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
+        with _progress(console):
+            done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
     except (UnusableInput, KeyboardInterrupt, OSError):
         raise
     except Exception as error:  # the model's own fault, told without our traceback
@@ -56,15 +61,41 @@ def fit(
         raise typer.Exit(1)
 
 
+@contextmanager
+def _progress(console: rich.console.Console) -> Iterator[None]:
+    """A bar with the time left for models that say how far they are, on a terminal."""
+    from rich.progress import Progress
+
+    from simgap.protocol import listen
+
+    if not console.is_terminal:
+        yield
+        return
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("fit", total=None)
+        listen(lambda done, total: bar.update(task, completed=done, total=total))
+        try:
+            yield
+        finally:
+            listen(None)
+
+
+def _told(value: object) -> str:
+    """What a fit chose, for people."""
+    if isinstance(value, dict):
+        return " ".join(f"{name} {_told(part)}" for name, part in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
 def _print_model(console: rich.console.Console, done: Fit) -> None:
     first = done.results[0]
     size = "" if first.n_params is None else f", parameters: {first.n_params}"
     lines = [f"{first.model} on {first.dataset}: fitted in {first.fit_seconds:.3g} s{size}"]
     if first.fitted:
-        lines.append(
-            "chosen: "
-            + ", ".join(f"{name} = {value}" for name, value in first.fitted.items() if not isinstance(value, list))
-        )
+        short = {
+            name: value for name, value in first.fitted.items() if not (isinstance(value, list) and len(value) > MANY)
+        }
+        lines.append("chosen: " + ", ".join(f"{name} = {_told(value)}" for name, value in short.items()))
     summary = getattr(done.model, "summary", None)
     if callable(summary):
         lines.append(str(summary()))

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+import simgap
 from simgap.cli import main
 
 
@@ -136,3 +137,28 @@ def test_parameters_are_read_as_in_a_suite():
 
     given = ["a=3", "b=1e-3", "c=word", 'd="4"', "e=true", "f=[1, 2]", "g="]
     assert parse_params(given) == {"a": 3, "b": 1e-3, "c": "word", "d": "4", "e": True, "f": [1, 2], "g": ""}
+
+
+def test_a_network_is_fitted_saved_and_loaded_again(capsys, folder, tmp_path):
+    code, out, err = run(
+        capsys, "fit", "gru", folder, "--param", "epochs=1", "--param", "batches=2", "--save", tmp_path / "w"
+    )
+    assert (code, err) == (0, "")
+    assert "epochs = 1" in out
+    assert simgap.load_model(tmp_path / "w").n_params > 3000
+
+
+def test_weights_of_what_has_none_are_refused_before_the_fit(capsys, folder, tmp_path):
+    code, out, err = run(capsys, "fit", "mean", folder, "--save", tmp_path / "w")
+    assert (code, out) == (2, "")
+    assert "only networks have weights" in err
+    assert not (tmp_path / "w").exists()
+
+
+def test_a_range_test_writes_its_curve(capsys, folder, tmp_path):
+    page, file = tmp_path / "rates.html", tmp_path / "rates.json"
+    code, out, err = run(capsys, "range-test", "srnn", folder, "--html", page, "--json", file)
+    assert (code, err) == (0, "")
+    assert "falls fastest at a learning rate of" in out
+    assert len(json.loads(file.read_text())["rates"]) > 50
+    assert "learning rate" in page.read_text()
