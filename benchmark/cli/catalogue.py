@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from enum import StrEnum
 from typing import Annotated
 
@@ -55,7 +54,7 @@ def _datasets() -> list[dict[str, str]]:
     from simgap.registry import DATASETS
 
     return [
-        {"name": name, "title": "" if missing else _first_line(DATASETS[name]), "missing": missing}
+        {"name": name, "title": "" if missing else DATASETS.title(name), "missing": missing}
         for name, missing in available().items()
     ]
 
@@ -75,7 +74,3 @@ def _suites() -> list[dict[str, str]]:
     from simgap.suites import load_suite, suite_names
 
     return [{"name": name, "title": load_suite(name).title, "missing": ""} for name in suite_names()]
-
-
-def _first_line(documented: object) -> str:
-    return (inspect.getdoc(documented) or "").partition("\n")[0]
