@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.protocol import Model
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -30,7 +29,7 @@ class Delta:
         """Fit the other model to the differences."""
         if data.n_init < 2:
             raise UnusableInput("delta needs at least two measured samples to start, for one difference")
-        self.inner: Model = MODELS[self.model](**self.params)
+        self.inner = MODELS[self.model](**self.params)
         train, valid = (tuple(_differences(x) for x in part if len(x) > 1) for part in (data.train, data.valid))
         self.inner.fit(replace(data, train=train, valid=valid, n_init=data.n_init - 1), seed)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from simgap.baselines.grey.machine import Machine, groups
@@ -20,7 +21,7 @@ class GreyBoxAuto(GreyBox):
     What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other.
     """
 
-    effects: tuple[()] = field(default=(), init=False, repr=False)
+    effects: Sequence[str] = field(default=(), init=False, repr=False)
     searches: list[Search] = field(default_factory=list, init=False, repr=False)
 
     def fit(self, data: TrainingSet, seed: int) -> None:

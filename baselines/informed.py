@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from simgap.baselines.greybox import GreyBox
 from simgap.baselines.greybox_auto import GreyBoxAuto
-from simgap.protocol import Model
 from simgap.records import Channel, Channels, Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -43,7 +42,7 @@ class Informed:
         added = tuple(Channel(f"effect{i}") for i in range(train[0].u.shape[1] - data.train[0].u.shape[1]))
         channels = Channels(data.channels.inputs + added, data.channels.outputs)
         valid = tuple(told(x) for x in data.valid if len(x) > n)
-        self.model: Model = MODELS[self.inner]()
+        self.model = MODELS[self.inner]()
         self.model.fit(replace(data, train=train, valid=valid, channels=channels), seed)
 
     def simulate(

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
+    from simgap.regression import Regression, check
     from simgap.reports.leaderboard import report
     from simgap.runner import Progress, run
     from simgap.suites import Suite, load_suite
@@ -26,6 +27,7 @@ _HOME = {
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
     ),
+    "simgap.regression": ("Regression", "check"),
     "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
     "simgap.reports.leaderboard": ("report",),
     "simgap.runner": ("Progress", "run"),
@@ -35,8 +37,8 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
-    "Progress", "Result", "Suite", "TrainingSet", "UnusableInput", "describe", "diagnose", "fetch", "fit", "load",
-    "load_model", "load_suite", "report", "run", "save",
+    "Progress", "Regression", "Result", "Suite", "TrainingSet", "UnusableInput", "check", "describe", "diagnose",
+    "fetch", "fit", "load", "load_model", "load_suite", "report", "run", "save",
 ]  # fmt: skip
 
 

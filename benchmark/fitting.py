@@ -26,6 +26,9 @@ from simgap.workers import threads_per_worker
 
 # Bytes of a model.json.
 LARGEST_DESCRIPTION = 1 << 20
+# Characters of what a fit says that it chose, and of a message, in a line of results.
+LARGEST_FITTED = 1 << 20
+LONGEST_MESSAGE = 1000
 
 
 class ModelFault(Exception):
@@ -87,8 +90,8 @@ def load_model(folder: str | Path) -> Any:
 
 
 def model_class(reference: str) -> type:
-    """The class called `reference`, a registered name or `file.py:Class`. Raises UnusableInput."""
-    found = load_class(reference) if ".py:" in reference else MODELS[reference]
+    """The class of a registered name, of `file.py:Class`, or of a `file.py` that holds one. Raises UnusableInput."""
+    found = load_class(reference) if ".py:" in reference or reference.endswith(".py") else MODELS[reference]
     for method in ("fit", "simulate"):
         if not callable(getattr(found, method, None)):
             raise UnusableInput(f"{reference} is no model: it has no method {method}")
@@ -119,14 +122,22 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         model.fit(training, about.seed)
         seconds = time.perf_counter() - start
     n_params = getattr(model, "n_params", None)
-    fitted = plain(getattr(model, "fitted", None) or {})
     return replace(
         about,
-        fitted=fitted if isinstance(fitted, dict) else {"fitted": fitted},
+        fitted=_chosen(model),
         n_params=int(n_params) if isinstance(n_params, int | np.integer) else None,
         fit_seconds=seconds,
-        message="; ".join(dict.fromkeys(str(w.message) for w in caught)),
+        message=_shortened("; ".join(dict.fromkeys(str(w.message) for w in caught))),
     )
+
+
+def _chosen(model: Model) -> dict[str, Any]:
+    """What the fit chose, if it is of a size for a line of results."""
+    fitted = plain(getattr(model, "fitted", None) or {})
+    size = len(json.dumps(fitted))
+    if size > LARGEST_FITTED:
+        return {"left_out": f"{size} characters, where {LARGEST_FITTED} are taken"}
+    return fitted if isinstance(fitted, dict) else {"fitted": fitted}
 
 
 def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Result) -> list[Result]:
@@ -178,16 +189,22 @@ class CheckedSimulation:
         for name, original in (("u", u), ("y_init", y_init)):
             if not np.array_equal(given[name], original):
                 raise ModelFault(f"it changed its argument {name} in place")
-        y_hat = np.asarray(answer, dtype=np.float64)
+        if not isinstance(answer, np.ndarray):
+            raise ModelFault(f"it returned a {type(answer).__name__}, where a NumPy array was asked for")
+        if answer.dtype != np.float64:
+            raise ModelFault(f"it returned {answer.dtype} values, where float64 was asked for")
         expected = (u.shape[0], u.shape[1] - y_init.shape[1], self.ny)
-        if y_hat.shape != expected:
-            raise ModelFault(f"it returned the shape {y_hat.shape}, where {expected} was asked for")
-        return y_hat
+        if answer.shape != expected:
+            raise ModelFault(f"it returned the shape {answer.shape}, where {expected} was asked for")
+        return np.asarray(answer)
 
 
 def reason(method: str, error: BaseException) -> str:
     """One line for people: what went wrong in a method of a model, and in which line of whose file."""
-    text = " ".join(str(error).split())
+    try:
+        text = _shortened(" ".join(str(error).split()))
+    except Exception as worse:  # of an exception that cannot even say what it is
+        text = f"without words, because its __str__ raised {type(worse).__name__}"
     if isinstance(error, UnusableInput):
         return text
     if isinstance(error, ModelFault):
@@ -195,3 +212,7 @@ def reason(method: str, error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     frame = next((f for f in reversed(frames) if "site-packages" not in f.filename), frames[-1])
     return f"{method} raised {type(error).__name__}: {text} ({Path(frame.filename).name}, line {frame.lineno})"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ... ({len(text)} characters)"

@@ -7,14 +7,15 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from simgap.fitting import build, fit_model, reason, score_model
+from simgap.fitting import build, fit_model, model_class, reason, score_model
 from simgap.metrics import failed_metrics
 from simgap.protocol import listen
+from simgap.provenance import source_sha256
 from simgap.records import Channels, Dataset, Result, Status
+from simgap.registry import MODELS
 from simgap.store import plain
 from simgap.suites import Entry
 from simgap.tasks import TASKS
@@ -90,7 +91,7 @@ class Job:
 def execute(job: Job) -> list[Result]:
     """Fit and score. Whatever the model does short of ending the process becomes rows."""
     try:
-        dataset = _load(job.source)
+        dataset = job.source.load()
     except Exception as error:  # the file may have changed since the parent read it
         return job.failed("error", f"the data set could not be loaded again: {error}")
     if dataset.sha256 != job.card.sha256:
@@ -99,9 +100,18 @@ def execute(job: Job) -> list[Result]:
         listen(_note_of(job))
         model = build(job.entry.name, job.entry.params)
         about = fit_model(model, dataset.training, job.about)
-    except (Exception, SystemExit) as error:  # a model may raise anything
+    except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
         return job.failed("error", reason("fit", error))
-    return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
+    try:
+        return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
+    except BaseException as error:
+        return job.failed("error", reason("simulate", error))
+
+
+def model_sha256(entry: Entry) -> str:
+    """Digest of the code of the model, and of the other one that it is told to use, if it is. Raises UnusableInput."""
+    inner = [value for value in entry.params.values() if isinstance(value, str) and value in MODELS]
+    return "".join(source_sha256(model_class(name)) for name in (entry.name, *inner))
 
 
 def progress_file(folder: str | Path, job: Job) -> Path:
@@ -117,8 +127,3 @@ def _note_of(job: Job) -> Callable[[int, int], None] | None:
 def _note(file: Path, done: int, total: int) -> None:
     with contextlib.suppress(OSError):  # a full disk must not end a fit
         file.write_text(f"{done} {total}", encoding="ascii")
-
-
-@lru_cache(maxsize=1)
-def _load(source: Source) -> Dataset:
-    return source.load()

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from simgap import store
-from simgap.fitting import check_params, model_class
-from simgap.jobs import Card, Job, Source
-from simgap.provenance import source_sha256
+from simgap.fitting import check_params
+from simgap.jobs import Card, Job, Source, model_sha256
 from simgap.records import Result, UnusableInput
-from simgap.registry import DATASETS, MODELS
+from simgap.registry import DATASETS
 from simgap.store import plain
 from simgap.suites import Entry, Suite
 
@@ -82,19 +81,13 @@ def plan(
 
     Each carries a digest of its model's code: results of the old code must not stand for the new.
     """
-    digests = {id(entry): {"model_sha256": _digest(entry)} for entry in entries}
+    digests = {id(entry): {"model_sha256": model_sha256(entry)} for entry in entries}
     return [
         Job(entry, source, card, seed, suite.tasks, provenance | digests[id(entry)])
         for source, card in data
         for seed in range(suite.seeds)
         for entry in entries
     ]
-
-
-def _digest(entry: Entry) -> str:
-    """Of the code of the model, and of the other one that it is told to use, if it is."""
-    inner = [value for value in entry.params.values() if isinstance(value, str) and value in MODELS]
-    return "".join(source_sha256(model_class(name)) for name in (entry.name, *inner))
 
 
 def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.Key, Result]:

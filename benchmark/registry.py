@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 from simgap.records import UnusableInput
@@ -91,6 +92,10 @@ class Registry:
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
         raise UnusableInput(f"there is no {self.kind} called {name!r}; known are {', '.join(self.names())}")
 
+    def module(self, name: str) -> str:
+        """The module of simgap that defines it; empty for somebody's own."""
+        return self._index()[name].module if name in self._index() else ""
+
     def title(self, name: str) -> str:
         """The first line of its docstring; nothing is imported unless it comes from somebody's own package."""
         if name in self._index():
@@ -102,7 +107,7 @@ class Registry:
 
         Where a package says what it REQUIRES, that is looked for instead of importing what takes seconds.
         """
-        package = self._index()[name].module.rpartition(".")[0] if name in self._index() else ""
+        package = self.module(name).rpartition(".")[0]
         required = getattr(importlib.import_module(package), "REQUIRES", ()) if package else ()
         if missing := [part for part in required if importlib.util.find_spec(part) is None]:
             return f"{self.kind} {name} is not available: {', '.join(missing)} is not installed"
@@ -158,10 +163,10 @@ DATASETS = Registry("dataset", ("simgap.data",), "DATASETS")
 
 
 def load_class(reference: str) -> type:
-    """The class behind `path/to/file.py:Class`. Raises UnusableInput when either does not exist."""
-    file, _, name = reference.rpartition(":")
+    """The class behind `path/to/file.py:Class`, or the only model of `path/to/file.py`. Raises UnusableInput."""
+    file, _, name = reference.rpartition(":") if ".py:" in reference else (reference, "", "")
     path = Path(file)
-    if not file or path.suffix != ".py":
+    if path.suffix != ".py":
         raise UnusableInput(f"--model {reference}: write it as path/to/my_model.py:MyModel")
     if not path.is_file():
         raise UnusableInput(f"--model {reference}: there is no file {path}")
@@ -172,8 +177,19 @@ def load_class(reference: str) -> type:
     sys.modules[module_name] = module  # dataclasses look their module up there
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise UnusableInput(f"--model {reference}: the file does not import: {error!r}") from error
+    if not name:
+        name = _only_model(module, reference)
     if not isinstance(getattr(module, name, None), type):
         raise UnusableInput(f"--model {reference}: {path} holds no class {name}")
     return getattr(module, name)
+
+
+def _only_model(module: ModuleType, reference: str) -> str:
+    own = [thing for thing in vars(module).values() if getattr(thing, "__module__", "") == module.__name__]
+    models = [thing.__name__ for thing in own if hasattr(thing, "fit") and hasattr(thing, "simulate")]
+    if len(models) != 1:
+        found = f"the classes {', '.join(models)}" if models else "no class with the methods fit and simulate"
+        raise UnusableInput(f"--model {reference}: the file holds {found}; write it as {reference}:MyModel")
+    return models[0]

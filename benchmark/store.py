@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import re
+import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict
+from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO, get_args
+from typing import Any, get_args
 
 from simgap.records import Result, Status, UnusableInput
 
@@ -36,6 +39,17 @@ def path_of(folder: Path, suite: str, model: str) -> Path:
     return Path(folder) / _file_name(suite) / f"{_file_name(model)}.jsonl"
 
 
+def writable(folder: Path) -> Path:
+    """The folder, made if it is not there. Raises UnusableInput, before any work is done, if nothing can be stored."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"0")
+    except OSError as error:
+        raise UnusableInput(f"results cannot be written into {folder}: {error.strerror or error}") from error
+    return folder
+
+
 def append(folder: Path, suite: str, results: Sequence[Result]) -> None:
     """Write the results of one job with one write per file, under a lock that other processes respect."""
     from filelock import FileLock
@@ -45,11 +59,35 @@ def append(folder: Path, suite: str, results: Sequence[Result]) -> None:
         by_path.setdefault(path_of(folder, suite, result.model), []).append(result)
     for path, rows in by_path.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        with FileLock(Path(folder) / ".lock"), path.open("a+b") as file:
-            _mend(file)
+        lines = "".join(encode(row) + "\n" for row in rows).encode()
+        with FileLock(Path(folder) / ".lock"), path.open("r+b" if path.exists() else "w+b", buffering=0) as file:
+            size = _mend(file)
+            try:
+                file.seek(size)
+                if file.write(lines) != len(lines):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+                os.fsync(file.fileno())
+            except OSError as error:  # a full disk takes a part of them
+                file.truncate(size)
+                raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def tidy(folder: Path, suite: str, model: str) -> None:
+    """Take the results out of a model's file that later ones have replaced, if there are any; all or nothing."""
+    from filelock import FileLock
+
+    path = path_of(folder, suite, model)
+    if not path.exists():
+        return
+    with FileLock(Path(folder) / ".lock"):
+        rows = read(path)
+        if len(rows) == path.read_bytes().count(b"\n"):
+            return
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}", delete=False) as file:
             file.write("".join(encode(row) + "\n" for row in rows).encode())
             file.flush()
             os.fsync(file.fileno())
+        Path(file.name).replace(path)
 
 
 def read(path: Path) -> list[Result]:
@@ -89,22 +127,23 @@ def plain(value: Any) -> Any:
         return [plain(entry) for entry in value]
     if isinstance(value, float):
         return value if math.isfinite(value) else str(value)
-    return value if isinstance(value, str | int | bool | None) else str(value)
+    if isinstance(value, int | bool | None):
+        return value
+    return str(value).encode("utf-8", "replace").decode()  # half of a pair of surrogates is no UTF-8
 
 
-def _mend(file: BinaryIO) -> None:
-    """End an unfinished last line if it is a whole result, else cut it off."""
-    if not (size := file.seek(0, os.SEEK_END)):
-        return
-    file.seek(size - 1)
-    if file.read(1) == b"\n":
-        return
+def _mend(file: FileIO) -> int:
+    """End an unfinished last line if it is a whole result, else cut it off; the size that the file then has."""
+    size = file.seek(0, os.SEEK_END)
+    if size:
+        file.seek(size - 1)
+    if file.read(1) in (b"", b"\n"):
+        return size
     file.seek(0)
-    last = file.read().rpartition(b"\n")[2]
+    last = file.readall().rpartition(b"\n")[2]
     if _is_json(last):
-        file.write(b"\n")
-    else:
-        file.truncate(size - len(last))
+        return size + file.write(b"\n")
+    return file.truncate(size - len(last))
 
 
 def _is_json(line: bytes) -> bool:

@@ -17,11 +17,15 @@ FOLDER = Path(__file__).parent / "suites"
 
 @dataclass(frozen=True)
 class Entry:
-    """One model of a suite: a registered name or `file.py:Class`, its parameters, its name in the results."""
+    """One model of a suite: a registered name or `file.py:Class`, its parameters, its name in the results.
+
+    gpus: how many GPUs, or what part of one, a cluster sets apart for it.
+    """
 
     name: str
     params: dict[str, Any] = field(default_factory=dict)
     label: str = ""
+    gpus: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.label:
@@ -30,7 +34,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Suite:
-    """What `simgap run` does unless told otherwise; timeout in seconds per fit with its simulations."""
+    """What `simgap run` does unless told otherwise; seconds and GiB are those of a fit with its simulations."""
 
     name: str
     title: str
@@ -39,6 +43,7 @@ class Suite:
     tasks: tuple[str, ...] = USUAL
     seeds: int = 1
     timeout: float = 3600.0
+    memory: float = 8.0
 
 
 def suite_names() -> list[str]:
@@ -68,7 +73,7 @@ class _Reader:
     table: dict[str, Any]
 
     def suite(self) -> Suite:
-        self._refuse_unknown(self.table, ("title", "datasets", "models", "tasks", "seeds", "timeout"))
+        self._refuse_unknown(self.table, ("title", "datasets", "models", "tasks", "seeds", "timeout", "memory"))
         suite = Suite(
             name=self.path.stem,
             title=self._get("title", str, self.path.stem),
@@ -77,12 +82,13 @@ class _Reader:
             tasks=tuple(str(task) for task in self._get("tasks", list, list(USUAL))),
             seeds=self._get("seeds", int, 1),
             timeout=float(self._get("timeout", (int, float), 3600)),
+            memory=float(self._get("memory", (int, float), 8)),
         )
         for task in suite.tasks:
             if task not in TASKS:
                 raise UnusableInput(f"{self.path}: there is no task {task!r}; known are {', '.join(TASKS)}")
-        if suite.seeds < 1 or not suite.timeout > 0:
-            raise UnusableInput(f"{self.path}: seeds and timeout must be positive")
+        if suite.seeds < 1 or not suite.timeout > 0 or not suite.memory > 0:
+            raise UnusableInput(f"{self.path}: seeds, timeout and memory must be positive")
         return suite
 
     def _datasets(self) -> tuple[str, ...]:
@@ -94,19 +100,31 @@ class _Reader:
         return tuple(name if name in DATASETS else self._near(name) for name in given)
 
     def _models(self) -> Iterable[Entry]:
+        """The entries of the tables; one with the name of a model that `all` has brought takes its place."""
         given = self._get("models", (list, str), "all")
         tables = [{"name": "all"}] if given == "all" else given
         if isinstance(tables, str) or not all(isinstance(table, dict) for table in tables):
             raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
+        usual: dict[str, Entry] = {}
+        chosen: list[Entry] = []
         for table in tables:
-            self._refuse_unknown(table, ("name", "params", "label"))
+            self._refuse_unknown(table, ("name", "params", "label", "gpus"))
             entry: tuple[Any, ...] = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
             if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
                 raise UnusableInput(f"{self.path}: a model needs a name, a table params and a text as label")
             if entry[0] == "all":
-                yield from (Entry(name) for name in MODELS)
+                usual = {name: Entry(name) for name in MODELS}
             else:
-                yield Entry(self._near(entry[0]) if ".py:" in entry[0] else entry[0], *entry[1:])
+                name = self._near(entry[0]) if ".py:" in entry[0] else entry[0]
+                chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table)))
+        labels = {entry.label for entry in chosen}
+        return [*(entry for label, entry in usual.items() if label not in labels), *chosen]
+
+    def _gpus(self, table: dict[str, Any]) -> float:
+        gpus = table.get("gpus", 0.0)
+        if not isinstance(gpus, int | float) or isinstance(gpus, bool) or not 0 <= gpus <= 64:
+            raise UnusableInput(f"{self.path}: gpus is {gpus!r}; give a number such as 0.25")
+        return float(gpus)
 
     def _near(self, name: str) -> str:
         """`name`, a path or `file.py:Class`, from the suite's own folder if there is such a file."""

@@ -1,8 +1,12 @@
-"""What a worker process does before it takes jobs. This module imports no NumPy: see `limit_threads`."""
+"""What a worker process does before it takes a job. This module imports no NumPy: see `limit_threads`."""
+
+from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import threading
+from dataclasses import dataclass, field
 
 _VARIABLES = (
     "OMP_NUM_THREADS",
@@ -11,15 +15,29 @@ _VARIABLES = (
     "NUMBA_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
+GIB = 1 << 30
 
 
-def prepare_worker(threads: int, folders: dict[str, str] | None = None) -> None:
-    """Limit the threads of this process, and end it when its parent ends.
+@dataclass(frozen=True)
+class Limits:
+    """What one job may use: threads of the numerical libraries, seconds, and GiB of memory.
 
-    folders: environment variables that name where models may keep what they need to carry on (SIMGAP_CHECKPOINTS).
+    environment: variables that name where a model may keep what it needs to carry on (SIMGAP_CHECKPOINTS) and where
+    it notes how far it is (SIMGAP_PROGRESS).
     """
-    limit_threads(threads)
-    os.environ.update(folders or {})
+
+    threads: int
+    timeout: float = 3600.0
+    memory: float = 8.0
+    environment: dict[str, str] = field(default_factory=dict)
+
+
+def prepare_worker(limits: Limits) -> None:
+    """Limit threads and memory of this process, have nobody hear it, and end it when its parent ends."""
+    limit_threads(limits.threads)
+    limit_memory(limits.memory)
+    silence()
+    os.environ.update(limits.environment)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -30,8 +48,34 @@ def threads_per_worker(workers: int) -> int:
 
 
 def limit_threads(threads: int) -> None:
-    """Set the limit of the numerical libraries. It counts only before NumPy is imported."""
+    """Set the limit of the numerical libraries, of those that will be loaded and of those that are there already."""
     os.environ.update(dict.fromkeys(_VARIABLES, str(threads)))
+    if "numpy" in sys.modules:
+        from threadpoolctl import threadpool_limits
+
+        threadpool_limits(threads)
+    if (torch := sys.modules.get("torch")) is not None:
+        torch.set_num_threads(threads)
+    if (numba := sys.modules.get("numba")) is not None:
+        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+
+
+def limit_memory(gib: float) -> None:
+    """Have the process fail to get more memory than that, where the system can (Linux), instead of the machine."""
+    if sys.platform == "linux":
+        import resource
+
+        _, most = resource.getrlimit(resource.RLIMIT_DATA)
+        wanted = int(gib * GIB)
+        resource.setrlimit(resource.RLIMIT_DATA, (wanted if most < 0 else min(wanted, most), most))
+
+
+def silence() -> None:
+    """What a model prints goes nowhere: megabytes of it would hide the progress, or fill a pipe that nobody reads."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
+    os.close(nowhere)
 
 
 def _end_with_parent() -> None:

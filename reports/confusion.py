@@ -75,7 +75,7 @@ def picture(rows: Sequence[Row], file: Path) -> None:
         for j, answer in enumerate(answers):
             if counts[name][answer]:
                 colour = "white" if shares[i][j] > 55 else "black"
-                axes.text(j, i, counts[name][answer], ha="center", va="center", color=colour, fontsize=8)
+                axes.text(j, i, str(counts[name][answer]), ha="center", va="center", color=colour, fontsize=8)
     axes.set_xticks(range(len(answers)), [a.replace("_", " ") for a in answers], rotation=60, ha="right", fontsize=8)
     axes.set_yticks(range(len(hidden)), [f"{h.replace('_', ' ')} ({counts[h].total()})" for h in hidden], fontsize=8)
     axes.set_xlabel("named first")

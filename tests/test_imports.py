@@ -8,11 +8,11 @@ import pytest
 ROOT = Path(__file__).parents[1]
 FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
            "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
-PARTS = ("baselines", "neural", "data", "reports", "cli", "effects", "diagnosis")
+PARTS = ("baselines", "neural", "data", "reports", "cli", "effects", "diagnosis", "engines")
 CONTRACTS = {"records", "protocol", "registry"}
 BENCH = {"metrics", "tasks", "store", "suites", "workers", "provenance", "fitting", "jobs", "planning",
-         "runner"}  # fmt: skip
-EVERYTHING = CONTRACTS | BENCH | {"findings", "data", "effects", "diagnosis", "reports", "simgap"}
+         "runner", "engines", "contract"}  # fmt: skip
+EVERYTHING = CONTRACTS | BENCH | {"findings", "regression", "data", "effects", "diagnosis", "reports", "simgap"}
 
 # part or module -> what it may import besides itself; "simgap" is the package's own version and lazy exports
 ALLOWED = {
@@ -22,7 +22,8 @@ ALLOWED = {
     "neural": CONTRACTS | {"data"},
     "baselines": CONTRACTS | {"data", "effects"},
     "findings": set(),
-    "reports": {"records", "metrics", "store", "findings", "effects"},
+    "regression": CONTRACTS | {"store", "suites"},
+    "reports": {"records", "metrics", "store", "findings", "effects", "regression"},
     **dict.fromkeys(BENCH, CONTRACTS | BENCH | {"data", "simgap"}),
     "metrics": {"records"},
     "tasks": {"records", "metrics"},

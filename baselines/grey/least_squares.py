@@ -141,7 +141,7 @@ class Problem:
         here, *there = self.simulator.run_many(thetas, locals_)
         m = here.shape[1] * here.shape[2]
 
-        def slope(moved: np.ndarray, step: float) -> np.ndarray:
+        def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
             change = (moved - here) * (self.records.weights / step)
             return self.noise.whiten(change).reshape(len(here), m)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.grey.least_squares import Estimate, Problem, Records
+from simgap.baselines.grey.least_squares import Estimate, Problem, Records, Slopes
 from simgap.baselines.grey.simulation import Simulator
 from simgap.baselines.grey.structure import Structure
 
@@ -73,7 +73,7 @@ def library(structure: Structure, states: np.ndarray, u: np.ndarray) -> tuple[tu
     return tuple(shapes), phi / (np.sqrt(np.mean(phi * phi, axis=(0, 1))) + 1e-300)
 
 
-def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes: object) -> float:
+def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes: Slopes) -> float:
     """Held-out share, over folds of whole experiments, or of blocks where there are few; 0 when it may be chance."""
     mask = records.mask
     fold = np.zeros(mask.shape, dtype=int)

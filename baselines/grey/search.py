@@ -105,10 +105,11 @@ class Search:
             return cls(records, held_out, channels, tuple(outputs), structure, plain, cut, off)
 
         search = started(tried[-1])
+        to_beat = search.held_out_error(search.plain)
         for simpler in (fit for fit in tried[:-1] if not fit.structure.zeros):
             # A higher order is no answer where a delay or another law of the plant, which cost no more, do as well.
             other = started(simpler)
-            if any(other.held_out_error(other.add(other.plain, term)) <= search.held_out_error(search.plain)
+            if any(other.held_out_error(other.add(other.plain, term)) <= to_beat
                    for term in (DELAY, *other.laws())):  # fmt: skip
                 search = other
                 break

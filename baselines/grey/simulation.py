@@ -51,10 +51,11 @@ class Simulator:
         forces = structure.forces()
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
+        acting: list[Any] = [term.effect for term in forces]
         unused = SLOTS - len(forces)
-        self._terms = tuple(compiled(term.effect.term) for term in forces) + (compiled(nothing),) * unused
+        self._terms = tuple(compiled(effect.term) for effect in acting) + (compiled(nothing),) * unused
         self._n_terms = len(forces)
-        self._roles = np.array([ROLES[term.effect.role] for term in forces] + [0] * unused)
+        self._roles = np.array([ROLES[effect.role] for effect in acting] + [0] * unused)
         self._p_at = np.array([structure.term_at(term).start for term in forces] + [0] * unused)
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory[:-1], *([0] * unused)])

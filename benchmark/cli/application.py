@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import catalogue, data, diagnosing, fitting, ranging, reporting, running
+from simgap.cli import authoring, catalogue, checking, data, diagnosing, fitting, ranging, reporting, running
 from simgap.records import UnusableInput
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -19,6 +19,9 @@ app.command("list")(catalogue.show)
 app.command("diagnose")(diagnosing.diagnose)
 app.command("fit")(fitting.fit)
 app.command("range-test")(ranging.range_test)
+app.command("check")(checking.check)
+app.command("new-model")(authoring.new_model)
+app.command("try-model")(authoring.try_model)
 app.add_typer(data.app, name="data")
 
 

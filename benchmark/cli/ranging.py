@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -31,7 +31,7 @@ def range_test(
     from simgap.reports.curves import LearningRates
 
     check_writable(json, html)
-    built = fitting.build(model, parse_params(param or ()))
+    built: Any = fitting.build(model, parse_params(param or ()))
     if not hasattr(built, "range_test"):
         raise UnusableInput(f"{model} has no learning rate; networks have: see `simgap list models`")
     dataset = load(data, inputs=inputs or (), outputs=outputs or (), dt=dt)

@@ -26,8 +26,9 @@ def run(
     model: Annotated[list[str] | None, typer.Option(help="path/to/file.py:Class; repeatable.")] = None,
     datasets: Annotated[str | None, typer.Option(help="Only these data sets, names or paths: x,y.")] = None,
     seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
-    jobs: Annotated[int, typer.Option(help="Number of worker processes.")] = 1,
-    engine: Annotated[str, typer.Option(help="Where the workers run: local.")] = "local",
+    jobs: Annotated[int, typer.Option(help="Number of jobs at a time on this machine.")] = 1,
+    engine: Annotated[str, typer.Option(help="Where the jobs run: local or ray.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Address of a Ray cluster.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
     inputs: Inputs = None,
     outputs: Outputs = None,
@@ -54,7 +55,7 @@ def run(
     try:
         with _shown(console) as progress:
             results = runner.run(
-                suite, names(models), model or (), names(datasets), seeds, jobs, engine, out,
+                suite, names(models), model or (), names(datasets), seeds, jobs, engine, address, out,
                 inputs or (), outputs or (), dt, progress,
             )  # fmt: skip
     except KeyboardInterrupt:

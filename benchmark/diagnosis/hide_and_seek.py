@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from simgap.records import Dataset, UnusableInput
-from simgap.workers import prepare_worker, threads_per_worker
+from simgap.workers import Limits, prepare_worker, threads_per_worker
 
 FILE = Path("hide-and-seek") / "cases.jsonl"
 # What an oracle that is told the effect must gain for the effect to count as visible.
@@ -96,8 +96,9 @@ def hide_and_seek(
     if todo:
         workers = min(jobs, len(todo))
         context = multiprocessing.get_context("spawn")
+        limits = Limits(threads_per_worker(workers))
         with (
-            ProcessPoolExecutor(workers, context, prepare_worker, (threads_per_worker(workers),)) as pool,
+            ProcessPoolExecutor(workers, context, prepare_worker, (limits,)) as pool,
             file.open("a", encoding="utf-8") as lines,
         ):
             try:

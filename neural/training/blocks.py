@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from simgap.neural.training.convolution import Convolution, Residual, full
+from simgap.neural.training.convolution import Convolution, Residual, full, pooled
 from simgap.neural.training.recurrent import Layer
 
 
@@ -29,7 +30,7 @@ class Recurrences(Block):
 
     def __init__(self, layers: Sequence[Layer]) -> None:
         super().__init__()
-        self.layers = nn.ModuleList(layers)
+        self.layers: Any = nn.ModuleList(layers)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """States of the uppermost layer."""
@@ -57,6 +58,7 @@ class Pooled(Block):
         self.first = Convolution(inputs, channels, kernel)
         self.second = Convolution(channels, channels, kernel)
         self.full = Convolution(channels, channels, window // 4)
+        nn.init.xavier_uniform_(self.full.weight.data.flatten(1))  # as the fully connected layer that it is
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """Features of the window that ends at each sample; before the start there are zeros."""
@@ -68,9 +70,7 @@ class Pooled(Block):
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
         """Features of the window, of which a remainder of fewer than four samples is left out at its start."""
-        x = self.second.pooled(self.first.pooled(x[:, x.shape[1] % 4 :]))
-        weight = self.full.weight.transpose(1, 2).flatten(1)
-        return torch.relu(nn.functional.linear(x.flatten(1), weight, self.full.bias))
+        return pooled(x[:, x.shape[1] % 4 :], self.first, self.second, self.full)
 
 
 class Tcn(Block):
@@ -79,7 +79,7 @@ class Tcn(Block):
     def __init__(self, inputs: int, channels: int, kernel: int, blocks: int, dropout: float = 0.0) -> None:
         super().__init__()
         sizes = [inputs] + [channels] * (blocks - 1)
-        self.blocks = nn.ModuleList(Residual(size, channels, kernel, dropout) for size in sizes)
+        self.blocks: Any = nn.ModuleList(Residual(size, channels, kernel, dropout) for size in sizes)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
         """Features at all samples; before the start there are zeros."""
@@ -88,10 +88,15 @@ class Tcn(Block):
         return x
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """The same at the last sample: a block of dilation d needs every d-th sample only, counted from the end."""
-        for level, block in enumerate(self.blocks):
-            x = block.over(x, step=2 if level else 1)
-        return x[:, -1]
+        """The same at the last sample.
+
+        A block of dilation d is asked for every d-th sample by the next one, counted from the end, and the uppermost
+        for one. What it is not asked for is not computed, and what is left of a sequence is one of dilation 1.
+        """
+        *lower, upper = self.blocks
+        for block in lower:
+            x = block.over(x, step=2)
+        return upper.over(x, step=x.shape[1])[:, 0]
 
 
 def _before(x: Float[Tensor, "B T F"], samples: int) -> Float[Tensor, "B T F"]:
@@ -123,7 +128,7 @@ class Parallel(Block):
 
     def __init__(self, blocks: Sequence[Block], features: int, hidden: int, dropout: float = 0.0) -> None:
         super().__init__()
-        self.blocks = nn.ModuleList(blocks)
+        self.blocks: Any = nn.ModuleList(blocks)
         self.dropout = nn.Dropout(dropout)
         self.narrow, self.wide = full(features, hidden), full(hidden, features)
 

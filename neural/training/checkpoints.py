@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from dataclasses import dataclass
@@ -26,14 +27,18 @@ class Checkpoint:
     history: dict[str, list[float]]
 
     def save(self) -> None:
-        """Write all of it; a reader sees the old file or the new one."""
+        """Write all of it; a reader sees the old file or the new one. A full disk does not end a training."""
         if self.path is None:
             return
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         told = {"history": json.dumps(self.history), "rate": repr(self.adam.param_groups[0]["lr"])}
         partial = self.path.with_name(f"{self.path.name}.{os.getpid()}")
-        save_file({name: value.contiguous() for name, value in self._tensors().items()}, partial, told)
-        partial.replace(self.path)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            save_file({name: value.contiguous() for name, value in self._tensors().items()}, partial, told)
+            partial.replace(self.path)
+        except (OSError, SafetensorError):
+            with contextlib.suppress(OSError):
+                partial.unlink()
 
     def restore(self) -> bool:
         """Whether there was such a file; one that is torn or does not fit is left alone and training starts anew."""
@@ -65,11 +70,6 @@ class Checkpoint:
             group["lr"] = rate
         return True
 
-    def remove(self) -> None:
-        """The training is over."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
-
     def _tensors(self) -> dict[str, Tensor]:
         named = dict(self.net.named_parameters())
         moments: dict[str, Any] = {
@@ -82,3 +82,10 @@ class Checkpoint:
             "random.order": self.order.get_state(),
             "random.dropout": torch.get_rng_state(),
         }
+
+
+def remove(path: Path) -> None:
+    """The training is over; what a killed one left half written goes too."""
+    with contextlib.suppress(OSError):
+        for file in path.parent.glob(f"{path.name}*"):
+            file.unlink(missing_ok=True)

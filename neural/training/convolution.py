@@ -9,38 +9,58 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from simgap.neural.training import convolution_kernels as kernels
+from simgap.neural.training import convolution_kernels
+
+kernels: Any = convolution_kernels  # compiled, and so are the checks of their arguments
 
 
 class _Pass(torch.autograd.Function):
-    """A dilated convolution, or one with pooling (dilation 0)."""
-
     @staticmethod
-    def forward(ctx: Any, x: Tensor, weight: Tensor, offset: Tensor, dilation: int) -> Tensor:
+    def forward(ctx: Any, x: Tensor, weight: Tensor, offset: Tensor, dilation: int, step: int) -> Tensor:
         values, w = x.detach().numpy(), weight.detach().numpy()
         batch, steps, channels = values.shape
-        columns = np.empty((batch * steps, channels * w.shape[2]), values.dtype)
-        y = np.empty((batch, steps, len(w)), values.dtype)
-        ctx.rest = w, columns, y, dilation, values.shape
-        if dilation:
-            kernels.run_conv(values, w, offset.detach().numpy(), dilation, columns, y)
-            return torch.from_numpy(y)
-        mean = np.empty((batch, steps // 2, len(w)), values.dtype)
-        kernels.run_pooled(values, w, offset.detach().numpy(), columns, y, mean)
-        return torch.from_numpy(mean)
+        answers = -(-steps // step)
+        columns = np.empty((batch * answers, channels * w.shape[2]), values.dtype)
+        y = np.empty((batch, answers, len(w)), values.dtype)
+        kernels.run_conv(values, w, offset.detach().numpy(), dilation, step, columns, y)
+        ctx.rest = w, columns, y, dilation, step, values.shape
+        return torch.from_numpy(y)
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        w, columns, y, dilation, (batch, steps, channels) = ctx.rest
+        w, columns, y, dilation, step, (batch, steps, channels) = ctx.rest
         wanted = ctx.needs_input_grad[0]
         dw, d_offset = np.empty_like(w), np.empty(len(w), y.dtype)
         dx = np.empty((batch, steps if wanted else 0, channels), y.dtype)
-        dy = grads[0].contiguous().numpy()
-        if dilation:
-            kernels.back_conv(w, columns, y, dy, dilation, dw, d_offset, dx)
-        else:
-            kernels.back_pooled(w, columns, y, dy, dw, d_offset, dx)
-        return torch.from_numpy(dx) if wanted else None, torch.from_numpy(dw), torch.from_numpy(d_offset), None
+        kernels.back_conv(w, columns, y, grads[0].contiguous().numpy(), dilation, step, dw, d_offset, dx)
+        return torch.from_numpy(dx) if wanted else None, torch.from_numpy(dw), torch.from_numpy(d_offset), None, None
+
+
+class _Pooled(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, *weights: Tensor) -> Tensor:
+        given = [value.detach().numpy() for value in weights]
+        values = x.detach().numpy()
+        batch, steps, channels = values.shape
+        held = []
+        for w, answers, pooled in zip(given[::2], (steps, steps // 2, 1), (True, True, False), strict=True):
+            held.append(np.empty((batch * answers, channels * w.shape[2]), values.dtype))
+            held.append(np.empty((batch, answers, len(w)), values.dtype))
+            if pooled:
+                held.append(np.empty((batch, answers // 2, len(w)), values.dtype))
+            channels = len(w)
+        kernels.run_pooled(values, *given, *held)
+        ctx.rest = given, held, values.shape
+        return torch.from_numpy(held[-1])
+
+    @staticmethod
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
+        given, held, (batch, steps, channels) = ctx.rest
+        wanted = ctx.needs_input_grad[0]
+        found = [np.empty_like(value) for value in given]
+        dx = np.empty((batch, steps if wanted else 0, channels), given[0].dtype)
+        kernels.back_pooled(*given[::2], *held, grads[0].contiguous().numpy(), *found, dx)
+        return (torch.from_numpy(dx) if wanted else None, *map(torch.from_numpy, found))
 
 
 class _Residual(torch.autograd.Function):
@@ -50,32 +70,35 @@ class _Residual(torch.autograd.Function):
         values = x.detach().numpy()
         batch, length, channels = values.shape
         outputs, _, taps = given[0].shape
-        steps = -(-length // step)
-        sizes = (channels, channels * taps, outputs, outputs * taps, outputs, outputs)
-        kept, columns1, y1, columns2, y2, y = held = [np.empty((batch, steps, size), values.dtype) for size in sizes]
-        flat = [columns.reshape(batch * steps, -1) for columns in (columns1, columns2)]
-        kernels.run_block(values, step, *given, dilation, kept, flat[0], y1, flat[1], y2, y)
-        ctx.rest = given, held, step, dilation, length
+        answers = -(-length // step)
+        rows = batch * length, batch * answers
+        columns = [
+            np.empty((rows[0], channels * taps), values.dtype),
+            np.empty((rows[1], outputs * taps), values.dtype),
+        ]
+        y1 = np.empty((batch, length, outputs), values.dtype)
+        y2, kept, y = (np.empty((batch, answers, size), values.dtype) for size in (outputs, channels, outputs))
+        held = columns[0], y1, columns[1], y2, kept, y
+        kernels.run_block(values, step, *given, dilation, *held)
+        ctx.rest = given, held, step, dilation, values.shape
         return torch.from_numpy(y)
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        (w1, o1, w2, o2, skip, skip_offset), (kept, columns1, y1, columns2, y2, y), step, dilation, length = ctx.rest
-        batch, steps, channels = kept.shape
+        given, held, step, dilation, (batch, length, channels) = ctx.rest
+        w1, _, w2, _, skip, _ = given
         wanted = ctx.needs_input_grad[0]
-        found = [np.empty_like(value) for value in (w1, o1, w2, o2, skip, skip_offset)]
-        dx = np.empty((batch, length if wanted else 0, channels), y.dtype)
-        flat = [columns.reshape(batch * steps, -1) for columns in (columns1, columns2)]
+        found = [np.empty_like(value) for value in given]
+        dx = np.empty((batch, length if wanted else 0, channels), w1.dtype)
         dy = grads[0].contiguous().numpy()
-        kernels.back_block(step, w1, w2, skip, dilation, kept, flat[0], y1, flat[1], y2, y, dy, *found, dx)
+        kernels.back_block(step, w1, w2, skip, dilation, *held, dy, *found, dx)
         return (torch.from_numpy(dx) if wanted else None, None, None, *map(torch.from_numpy, found))
 
 
 class Residual(nn.Module):
     """y = ReLU(F(x) + x), F = conv - ReLU - dropout - conv - ReLU - dropout (Bai, Kolter and Koltun 2018).
 
-    Where the number of channels changes, x passes through a 1 x 1 convolution around F. `over` may look at every
-    `step`-th sample only, counted from the end.
+    Where the number of channels changes, x passes through a 1 x 1 convolution around F.
     """
 
     def __init__(self, inputs: int, channels: int, kernel: int, dropout: float) -> None:
@@ -85,7 +108,7 @@ class Residual(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def over(self, x: Float[Tensor, "B T F"], dilation: int = 1, step: int = 1) -> Float[Tensor, "B S G"]:
-        """The block over a sequence."""
+        """The block over a sequence, at every `step`-th sample counted from the end."""
         if x.device.type == "cpu" and not (self.training and self.dropout.p):
             weights = [self.one.weight, self.one.bias, self.two.weight, self.two.bias]
             if self.through is None:
@@ -93,10 +116,9 @@ class Residual(nn.Module):
             else:
                 weights += [self.through.weight, self.through.bias]
             return _Residual.apply(x.contiguous(), step, dilation, *weights)  # type: ignore[no-any-return]
+        inner = self.dropout(self.one.over(x, dilation))
+        inner = self.dropout(self.two.over(inner, dilation, step))
         x = x[:, (x.shape[1] - 1) % step :: step]
-        inner = x
-        for convolution in (self.one, self.two):
-            inner = self.dropout(convolution.over(inner, dilation))
         return torch.relu(inner + (x if self.through is None else self.through(x)))
 
 
@@ -117,15 +139,25 @@ class Convolution(nn.Conv1d):
         assert self.bias is not None
         nn.init.zeros_(self.bias)
 
-    def over(self, x: Float[Tensor, "B T F"], dilation: int = 1) -> Float[Tensor, "B T G"]:
-        """The convolution of a sequence."""
+    def over(self, x: Float[Tensor, "B T F"], dilation: int = 1, step: int = 1) -> Float[Tensor, "B S G"]:
+        """The convolution of a sequence, at every `step`-th sample counted from the end."""
         if x.device.type == "cpu":
-            return _Pass.apply(x.contiguous(), self.weight, self.bias, dilation)  # type: ignore[no-any-return]
+            return _Pass.apply(x.contiguous(), self.weight, self.bias, dilation, step)  # type: ignore[no-any-return]
         padded = nn.functional.pad(x.transpose(1, 2), ((self.kernel_size[0] - 1) * dilation, 0))
-        return torch.relu(nn.functional.conv1d(padded, self.weight, self.bias, dilation=dilation)).transpose(1, 2)
+        y = torch.relu(nn.functional.conv1d(padded, self.weight, self.bias, dilation=dilation)).transpose(1, 2)
+        return y[:, (x.shape[1] - 1) % step :: step]
 
-    def pooled(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B S G"]:
-        """The means of each two samples of the convolution of a sequence of even length."""
-        if x.device.type == "cpu":
-            return _Pass.apply(x.contiguous(), self.weight, self.bias, 0)  # type: ignore[no-any-return]
-        return self.over(x).unflatten(1, (-1, 2)).mean(2)
+
+def pooled(
+    x: Float[Tensor, "B T F"], first: Convolution, second: Convolution, last: Convolution
+) -> Float[Tensor, "B G"]:
+    """Two convolutions, each followed by the mean of each two samples, and a third one at the last sample.
+
+    The length has to be a multiple of four.
+    """
+    if x.device.type == "cpu":
+        weights = [value for part in (first, second, last) for value in (part.weight, part.bias)]
+        return _Pooled.apply(x.contiguous(), *weights)[:, 0]  # type: ignore[no-any-return]
+    for part in (first, second):
+        x = part.over(x).unflatten(1, (-1, 2)).mean(2)
+    return last.over(x, step=x.shape[1])[:, 0]

@@ -18,7 +18,7 @@ from simgap.neural.training.examples import Examples
 
 # Windows or pieces whose error is computed at once, after an epoch, and at the end: the paper's 24,160 to train on and
 # 5,400 to validate on are all among them.
-AT_ONCE = 512
+AT_ONCE = 256
 AFTER_AN_EPOCH = 6000
 AT_THE_END = 30_000
 
@@ -81,6 +81,7 @@ def train(
     """Train in place; afterwards the network has the weights of its best epoch. Raises NotANumber."""
     net.to(device)
     adam = optimiser(net, recipe)
+    parameters = list(net.parameters())
     order = torch.Generator().manual_seed(seed)
     history = History()
     best = {name: value.clone() for name, value in net.state_dict().items()}
@@ -89,17 +90,18 @@ def train(
     while len(history.valid) < recipe.epochs and not _hopeless(history, recipe):
         begin = time.perf_counter()
         net.train()
-        total = torch.zeros((), device=device)
+        losses = []
         batches = _shuffled(len(examples), recipe, order)
         for chosen in batches:
             x, y = (part.to(device) for part in examples.batch(chosen))
-            for p in net.parameters():
+            for p in parameters:
                 p.grad = None
             loss = nn.functional.mse_loss(examples.answer(net, x), y)
             loss.backward()
             adam.step()
-            total += loss.detach() * len(chosen)
-        history.train.append(float(total) / sum(map(len, batches)))
+            losses.append(loss.detach())
+        sizes = torch.tensor([len(chosen) for chosen in batches], dtype=torch.double)
+        history.train.append(float(torch.stack(losses).cpu().double() @ sizes / sizes.sum()))
         history.valid.append(error(net, held_out, device))
         history.rate.append(adam.param_groups[0]["lr"])
         history.seconds.append(time.perf_counter() - begin)

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import os
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from simgap.neural.training import sequences, weights, windows
+from simgap.neural.training import checkpoints, sequences, weights, windows
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
 from simgap.neural.training.loop import History, Recipe, figures, range_test, train
@@ -23,6 +23,7 @@ from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
 from simgap.records import TrainingSet, UnusableInput
 
+WINDOWED = Recipe(epochs=30, batch=32, learning_rate=1e-4, patience=1, early_stop=10)
 STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=40)
 # Free runs of held-out data on which the best epoch is chosen: samples of each, and how many.
 HELD_OUT = (1000, 32)
@@ -71,10 +72,9 @@ class Network(ABC):
     @property
     def recipe(self) -> Recipe:
         """How this model is trained."""
-        if self.windowed:
-            return Recipe(self.epochs, 32, self.learning_rate or 1e-4, 1, 10, self.l2, batches=self.batches)
-        return Recipe(self.epochs, STATEFUL.batch, self.learning_rate or STATEFUL.learning_rate, STATEFUL.patience,
-                      STATEFUL.early_stop, self.l2, STATEFUL.improvement, self.batches or STATEFUL.batches)  # fmt: skip
+        usual = WINDOWED if self.windowed else STATEFUL
+        return replace(usual, epochs=self.epochs, l2=self.l2, batches=self.batches or usual.batches,
+                       learning_rate=self.learning_rate or usual.learning_rate)  # fmt: skip
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Train; carries on from the last epoch of an interrupted run where SIMGAP_CHECKPOINTS names a folder."""
@@ -97,7 +97,7 @@ class Network(ABC):
             "seconds_per_epoch": float(np.median(history.seconds)), "device": self.device,
         }  # fmt: skip
         if checkpoint is not None:
-            checkpoint.unlink(missing_ok=True)
+            checkpoints.remove(checkpoint)
 
     def prepare(self, data: TrainingSet, seed: int) -> tuple[Examples, Examples, Block]:
         """Examples to train on and to validate on, and the untrained network."""
@@ -106,21 +106,21 @@ class Network(ABC):
         nu, ny = len(data.channels.inputs), len(data.channels.outputs)
         self.of_x, self.of_y = scalings(data.train, time=self.windowed)
         valid = data.valid or data.train
+        examples: Examples
+        held_out: Examples
         if self.windowed:
             given = (self.of_x, self.of_y, self.window, True, self.resident)
-            examples: tuple[Examples, Examples] = (windows.Windows(data.train, *given), windows.Windows(valid, *given))
+            examples, held_out = windows.Windows(data.train, *given), windows.Windows(valid, *given)
             self.inputs = 1 + nu
         else:
             n = data.n_init
-            examples = (
-                sequences.Sequences(data.train, self.of_x, self.of_y, n),
-                sequences.Sequences(valid, self.of_x, self.of_y, n, *HELD_OUT),
-            )
+            examples = sequences.Sequences(data.train, self.of_x, self.of_y, n)
+            held_out = sequences.Sequences(valid, self.of_x, self.of_y, n, *HELD_OUT)
             self.inputs = nu + ny + 1
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             net = self.net(self.inputs, ny)
-        return *examples, net
+        return examples, held_out, net
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]

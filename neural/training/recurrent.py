@@ -13,7 +13,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from simgap.neural.training import recurrent_kernels as kernels
+from simgap.neural.training import recurrent_kernels
+
+kernels: Any = recurrent_kernels  # compiled, and so are the checks of their arguments
 
 Weights = tuple[Tensor, Tensor, Tensor, Tensor]
 Net = TypeVar("Net", bound=nn.RNNBase)
@@ -65,7 +67,7 @@ class _Pass(torch.autograd.Function):
         return dx, dw, du, flat.sum(1), flat_inner.sum(1), None, None
 
 
-class Layer:
+class Layer(nn.Module):
     """`states` and `last` for a layer of PyTorch with one level and the batch first."""
 
     def states(self: Any, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T H"]:
@@ -109,11 +111,11 @@ def recurrent(layer: type[Net], inputs: int, units: int) -> Net:
     Glorot uniform from the input, orthogonal from the state with all gates together, offsets zero but that of a
     forget gate, which is one.
     """
-    made = layer(inputs, units, batch_first=True)
+    made: Any = layer(inputs, units, batch_first=True)  # type: ignore[call-arg]  # RNNBase asks for its kind
     nn.init.xavier_uniform_(made.weight_ih_l0)
     nn.init.orthogonal_(made.weight_hh_l0)
     nn.init.zeros_(made.bias_ih_l0)
     nn.init.zeros_(made.bias_hh_l0)
-    if isinstance(made, nn.LSTM):
+    if layer is Lstm:
         made.bias_ih_l0.data[units : 2 * units] = 1.0
     return made

@@ -41,10 +41,11 @@ def example():
 def suite(folder: Path, tmp_path: Path):
     """`suite("Mean", "Hangs", timeout=5)` writes a suite of example models on the small data set."""
 
-    def write(*models: str, timeout: float = 60, seeds: int = 1, datasets: str = '["noise"]') -> str:
+    def write(*models: str, timeout: float = 60, seeds: int = 1, datasets: str = '["noise"]', memory: float = 8) -> str:
         path = tmp_path / "mine.toml"
         tables = "".join(f'[[models]]\nname = "{MODELS.as_posix()}:{model}"\n' for model in models)
-        path.write_text(f'title = "Mine"\ndatasets = {datasets}\ntimeout = {timeout}\nseeds = {seeds}\n{tables}')
+        limits = f"timeout = {timeout}\nmemory = {memory}\nseeds = {seeds}\n"
+        path.write_text(f'title = "Mine"\ndatasets = {datasets}\n{limits}{tables}')
         return str(path)
 
     return write

@@ -1,7 +1,9 @@
 """Models as a stranger writes them: nothing here imports simgap."""
 
 import os
+import signal
 import sys
+import threading
 import time
 import warnings
 from dataclasses import dataclass
@@ -108,6 +110,99 @@ class Threads(Mean):
     def fit(self, data, seed):
         super().fit(data, seed)
         self.fitted = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
+
+
+class HangsInSimulate(Mean):
+    def simulate(self, u, y_init):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        while True:
+            pass
+
+
+class Crashes(Mean):
+    def fit(self, data, seed):
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Leaks(Mean):
+    def fit(self, data, seed):
+        kept = []
+        while True:
+            kept.append(np.ones(1 << 22))
+
+
+class Prints(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        for _ in range(2000):
+            print("x" * 1000)
+            os.write(2, b"y" * 1000)
+
+
+class SinglePrecision(Mean):
+    def simulate(self, u, y_init):
+        return super().simulate(u, y_init).astype(np.float32)
+
+
+class IsComplex(Mean):
+    def simulate(self, u, y_init):
+        return super().simulate(u, y_init) + 0j
+
+
+class IsAList(Mean):
+    def simulate(self, u, y_init):
+        return super().simulate(u, y_init).tolist()
+
+
+class Interrupts(Mean):
+    def fit(self, data, seed):
+        raise KeyboardInterrupt
+
+
+class EndsInSimulate(Mean):
+    def simulate(self, u, y_init):
+        raise GeneratorExit
+
+
+class Speechless(Exception):
+    def __str__(self):
+        raise ValueError("no words")
+
+
+class RaisesSpeechless(Mean):
+    def fit(self, data, seed):
+        raise Speechless
+
+
+class RaisesNovels(Mean):
+    def fit(self, data, seed):
+        raise ValueError("\ud800" + "word " * 100_000)
+
+
+class LeavesAThread(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        threading.Thread(target=time.sleep, args=(3600,)).start()
+
+
+class ChoosesMuch(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        self.fitted = {"all": list(range(1_000_000))}
+
+
+class ChangesTheWorld(Mean):
+    """What it does to its process must not reach the next model."""
+
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        np.concatenate = None
+
+
+class Sleeps(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        time.sleep(0.3)
 
 
 class NotAModel:

@@ -53,6 +53,13 @@ def test_a_user_writes_a_suite_with_labels_and_parameters(tmp_path):
     assert (suite.name, suite.tasks, suite.seeds, suite.timeout) == ("mine", ("free_run",), 3, 1.5)
 
 
+def test_a_table_takes_the_place_of_a_model_that_all_has_brought(tmp_path):
+    text = '[[models]]\nname = "all"\n[[models]]\nname = "gru"\nparams = { epochs = 1 }\ngpus = 0.5\n'
+    entries = {entry.label: entry for entry in load_suite(written(tmp_path, text)).models}
+    assert set(entries) == set(MODELS)
+    assert (entries["gru"].params, entries["gru"].gpus) == ({"epochs": 1}, 0.5)
+
+
 def test_all_models_and_one_more_fit_in_one_suite(tmp_path):
     text = '[[models]]\nname = "all"\n[[models]]\nname = "arx"\nlabel = "ARX321"\n'
     assert [entry.label for entry in load_suite(written(tmp_path, text)).models] == [*MODELS, "ARX321"]

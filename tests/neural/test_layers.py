@@ -5,7 +5,7 @@ import torch
 from torch import nn
 
 from simgap.neural.training.blocks import Parallel, Pooled, Recurrences, Tcn
-from simgap.neural.training.convolution import Convolution, Residual
+from simgap.neural.training.convolution import Convolution, Residual, pooled
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn, recurrent
 
 
@@ -44,7 +44,7 @@ def test_a_convolution_is_that_of_pytorch_with_zeros_before_the_start(dilation):
     torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
 
 
-@pytest.mark.parametrize(("inputs", "step", "dilation"), [(3, 1, 1), (5, 1, 4), (5, 2, 1), (3, 2, 2)])
+@pytest.mark.parametrize(("inputs", "step", "dilation"), [(3, 1, 1), (5, 1, 4), (5, 2, 1), (3, 2, 2), (5, 13, 1)])
 def test_a_residual_block_is_two_convolutions_and_a_way_around(inputs, step, dilation):
     torch.manual_seed(0)
     block = Residual(inputs, 5, 3, dropout=0.5).double()
@@ -53,9 +53,8 @@ def test_a_residual_block_is_two_convolutions_and_a_way_around(inputs, step, dil
     x = torch.randn(2, 13, inputs, dtype=torch.double, requires_grad=True)
     block.eval()  # the pass of its own; with dropout it is made of PyTorch's operations
     ours = block.over(x, dilation, step)
-    kept = x[:, (13 - 1) % step :: step]
-    inner = block.two.over(block.one.over(kept, dilation), dilation)
-    theirs = torch.relu(inner + (kept if block.through is None else block.through(kept)))
+    inner = block.two.over(block.one.over(x, dilation), dilation)
+    theirs = torch.relu(inner + (x if block.through is None else block.through(x)))[:, (13 - 1) % step :: step]
     torch.testing.assert_close(ours, theirs)
     parts = [x, *block.parameters()]
     torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
@@ -63,11 +62,14 @@ def test_a_residual_block_is_two_convolutions_and_a_way_around(inputs, step, dil
 
 def test_pooling_takes_the_mean_of_two_samples():
     torch.manual_seed(0)
-    layer = Convolution(3, 5, 4).double()
+    layers = [Convolution(3, 5, 4).double(), Convolution(5, 6, 3).double(), Convolution(6, 2, 3).double()]
     x = torch.randn(2, 12, 3, dtype=torch.double, requires_grad=True)
-    ours, theirs = layer.pooled(x), layer.over(x).unflatten(1, (-1, 2)).mean(2)
+    theirs = x
+    for layer in layers[:2]:
+        theirs = layer.over(theirs).unflatten(1, (-1, 2)).mean(2)
+    ours, theirs = pooled(x, *layers), layers[2].over(theirs)[:, -1]
     torch.testing.assert_close(ours, theirs)
-    parts = [x, layer.weight, layer.bias]
+    parts = [x, *(p for layer in layers for p in layer.parameters())]
     torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
 
 
