@@ -22,8 +22,9 @@ from simgap.records import Result
 from simgap.registry import MODELS
 from simgap.workers import Limits, prepare_worker
 
-# Imported once, by the process from which those of the jobs are forked.
+# Imported once, by the process from which those of the jobs are forked; the last by the first step of an optimiser.
 PRELOADED = ("simgap.jobs", "simgap.data", "numba", "scipy.signal", "scipy.optimize")
+PRELOADED_FOR_NETWORKS = ("torch._dynamo",)
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,9 @@ def _context(todo: Sequence[Job]) -> BaseContext:
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    models = {MODELS.module(job.entry.name) for job in todo}
-    context.set_forkserver_preload([*PRELOADED, *sorted(models - {""})])
+    models = sorted({MODELS.module(job.entry.name) for job in todo} - {""})
+    networks = any(name.startswith("simgap.neural.") for name in models)
+    context.set_forkserver_preload([*PRELOADED, *models, *(PRELOADED_FOR_NETWORKS if networks else ())])
     return context
 
 
