@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -17,6 +18,11 @@ from typing import Any, get_args
 from simgap.records import Result, Status, UnusableInput
 
 Key = tuple[str, str, str, str, str, int]
+
+# Larger ones are no floating-point numbers; infinities are written as texts.
+LARGEST_NUMBER = sys.float_info.max
+# Bytes of a file of results.
+LARGEST_FILE = 1 << 30
 
 _NUMBER = (int, float, type(None))
 _REQUIRED: dict[str, Any] = {
@@ -98,6 +104,8 @@ def read(path: Path) -> list[Result]:
     """
     rows: dict[Key, Result] = {}
     for file in sorted(path.glob("*.jsonl")) if path.is_dir() else [path]:
+        if file.stat().st_size > LARGEST_FILE:
+            raise UnusableInput(f"{file} is larger than any file of results")
         *lines, last = file.read_bytes().split(b"\n")
         if last and _is_json(last):
             lines.append(last)
@@ -157,13 +165,17 @@ def _is_json(line: bytes) -> bool:
 def _decode(line: bytes, where: str) -> Result:
     try:
         row = json.loads(line, parse_constant=_refuse)
+        if not isinstance(row, dict):
+            raise UnusableInput(f"{where}: this is no line of results but a {type(row).__name__}")
+        _check_fields(row, where)
+        row["metrics"] = {name: _figures(figures, where) for name, figures in row.get("metrics", {}).items()}
+        result = Result(**row)
+        key(result)
     except (ValueError, RecursionError) as error:  # bytes that are not UTF-8 are a ValueError too
+        if isinstance(error, UnusableInput):
+            raise
         raise UnusableInput(f"{where}: this is no line of results: {error}") from error
-    if not isinstance(row, dict):
-        raise UnusableInput(f"{where}: this is no line of results but a {type(row).__name__}")
-    _check_fields(row, where)
-    row["metrics"] = {name: _figures(figures, where) for name, figures in row.get("metrics", {}).items()}
-    return Result(**row)
+    return result
 
 
 def _check_fields(row: dict[str, Any], where: str) -> None:
@@ -173,29 +185,40 @@ def _check_fields(row: dict[str, Any], where: str) -> None:
             raise UnusableInput(f"{where}: unknown field {name!r}; was this written by a newer simgap?")
         if not isinstance(value, types[name]) or isinstance(value, bool):
             raise UnusableInput(f"{where}: {name} is a {type(value).__name__}, which it cannot be")
+        if isinstance(value, int | float) and not abs(value) <= LARGEST_NUMBER:
+            raise UnusableInput(f"{where}: {name} is larger than it can be")
     if missing := [name for name in _REQUIRED if name not in row]:
         raise UnusableInput(f"{where}: the field {missing[0]!r} is missing")
     if row["status"] not in get_args(Status):
         raise UnusableInput(f"{where}: the status {row['status']!r} is none of {', '.join(get_args(Status))}")
     if row.get("schema", 1) != 1:
         raise UnusableInput(f"{where}: schema {row['schema']} is unknown; this simgap reads schema 1")
+    if not all(isinstance(unit, str) for unit in row.get("units", {}).values()):
+        raise UnusableInput(f"{where}: the units of outputs are texts")
 
 
 def _figures(figures: Any, where: str) -> dict[str, Any]:
+    """The figures of one output; those of a simulation that was scored are all there."""
     if not isinstance(figures, dict):
         raise UnusableInput(f"{where}: the metrics of an output are a {type(figures).__name__}, not figures by name")
     decoded: dict[str, Any] = {}
     for name, value in figures.items():
-        match value:
-            case dict():
-                decoded[name] = _figures(value, where)
-            case "inf" | "-inf":
-                decoded[name] = float(value)
-            case int() | float() if not isinstance(value, bool):
-                decoded[name] = value
-            case _:
-                raise UnusableInput(f"{where}: the metric {name!r} is {str(value)[:40]!r}, which is no number")
+        if isinstance(value, dict):
+            decoded[name] = {inner: _number(number, inner, where) for inner, number in value.items()}
+        else:
+            decoded[name] = _number(value, name, where)
+    needed = ("rmse", "std") if decoded.get("n_scored") else ("rmse",)
+    if missing := [name for name in needed if not isinstance(decoded.get(name), int | float)]:
+        raise UnusableInput(f"{where}: the metrics of an output lack the number {missing[0]}")
     return decoded
+
+
+def _number(value: Any, name: str, where: str) -> int | float:
+    if value in ("inf", "-inf"):
+        return float(value)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST_NUMBER:
+        raise UnusableInput(f"{where}: the metric {name!r} is {str(value)[:40]!r}, which is no number")
+    return value
 
 
 def _refuse(constant: str) -> float:

@@ -57,7 +57,8 @@ def limit_threads(threads: int) -> None:
     if (torch := sys.modules.get("torch")) is not None:
         torch.set_num_threads(threads)
     if (numba := sys.modules.get("numba")) is not None:
-        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+        numba.config.reload_config()  # reads the variable, as every compilation does, which refuses another number
+        numba.set_num_threads(threads)
 
 
 def limit_memory(gib: float) -> None:

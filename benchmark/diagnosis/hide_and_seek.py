@@ -149,14 +149,14 @@ def plan(
 
 def read(file: Path) -> Iterator[Outcome]:
     """The stored outcomes; a line that was torn by a crash is run again."""
-    for line in file.read_text(encoding="utf-8").splitlines() if file.is_file() else ():
+    for line in file.read_bytes().splitlines() if file.is_file() else ():
         try:
             row = json.loads(line)
             yield Outcome(**(row | {
                 "case": Case(**row["case"]), "named": tuple(row["named"]),
                 "confounded": tuple(map(tuple, row["confounded"])),
             }))  # fmt: skip
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, RecursionError):
             continue
 
 

@@ -22,9 +22,10 @@ from simgap.records import Result
 from simgap.registry import MODELS
 from simgap.workers import Limits, prepare_worker
 
-# Imported once, by the process from which those of the jobs are forked; the last by the first step of an optimiser.
-PRELOADED = ("simgap.jobs", "simgap.data", "numba", "scipy.signal", "scipy.optimize")
-PRELOADED_FOR_NETWORKS = ("torch._dynamo",)
+# Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
+# changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
+PRELOADED = ("simgap.jobs", "numba", "scipy.signal", "scipy.optimize", "scipy.stats")
+PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,9 @@ def _context(todo: Sequence[Job]) -> BaseContext:
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    models = sorted({MODELS.module(job.entry.name) for job in todo} - {""})
-    networks = any(name.startswith("simgap.neural.") for name in models)
-    context.set_forkserver_preload([*PRELOADED, *models, *(PRELOADED_FOR_NETWORKS if networks else ())])
+    named = {str(name) for job in todo for name in (job.entry.name, *job.entry.params.values())}
+    networks = any(MODELS.module(name).startswith("simgap.neural.") for name in named)
+    context.set_forkserver_preload([*PRELOADED, *(PRELOADED_FOR_NETWORKS if networks else ())])
     return context
 
 

@@ -9,6 +9,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import numba
 import numpy as np
 
 
@@ -199,10 +200,30 @@ class ChangesTheWorld(Mean):
         np.concatenate = None
 
 
+class SeesGpu(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+        self.fitted = {"visible": os.environ.get("CUDA_VISIBLE_DEVICES")}
+
+
 class Sleeps(Mean):
     def fit(self, data, seed):
         super().fit(data, seed)
         time.sleep(0.3)
+
+
+class Compiles(Mean):
+    def fit(self, data, seed):
+        super().fit(data, seed)
+
+        @numba.njit(parallel=True)
+        def added(x):
+            total = 0.0
+            for i in numba.prange(len(x)):
+                total += x[i]
+            return total
+
+        self.fitted = {"three": added(np.ones(3)), "threads": numba.get_num_threads()}
 
 
 class NotAModel:

@@ -142,6 +142,11 @@ def test_threads_are_shared_out_among_the_workers(suite, tmp_path):
     assert rows[0].provenance["threads"] == 1
 
 
+def test_a_model_that_compiles_with_numba_has_its_share_of_threads(suite, tmp_path):
+    (row, *_) = simgap.run(suite("Compiles"), jobs=1000, out=tmp_path / "out")
+    assert (row.status, row.fitted) == ("ok", {"three": 3.0, "threads": 1})
+
+
 def test_what_the_user_names_replaces_what_the_suite_lists(suite, tmp_path, example, folder):
     rows = simgap.run(suite("Mean"), model=example("Scaled"), datasets=[str(folder)], out=tmp_path / "out")
     assert {row.model for row in rows} == {"Scaled"}
