@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import pickle
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -91,7 +92,7 @@ class Job:
 def execute(job: Job) -> list[Result]:
     """Fit and score. Whatever the model does short of ending the process becomes rows."""
     try:
-        dataset = job.source.load()
+        dataset = _load(job)
     except Exception as error:  # the file may have changed since the parent read it
         return job.failed("error", f"the data set could not be loaded again: {error}")
     if dataset.sha256 != job.card.sha256:
@@ -106,6 +107,22 @@ def execute(job: Job) -> list[Result]:
         return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
     except BaseException as error:
         return job.failed("error", reason("simulate", error))
+
+
+def _load(job: Job) -> Dataset:
+    """The job's data, which may take seconds to make: the first job of a run leaves them for the others."""
+    folder = os.environ.get("SIMGAP_PROGRESS")
+    if folder is None:
+        return job.source.load()
+    file = Path(folder) / f"{job.card.sha256}.data"
+    if not file.exists():
+        dataset = job.source.load()
+        partial = file.with_suffix(f".{os.getpid()}")
+        with contextlib.suppress(OSError):  # a full disk must not end a fit
+            partial.write_bytes(pickle.dumps(dataset))
+            partial.replace(file)
+        return dataset
+    return pickle.loads(file.read_bytes())  # from the run's own folder, which nobody else may write
 
 
 def model_sha256(entry: Entry) -> str:

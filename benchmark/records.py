@@ -83,6 +83,10 @@ class Experiment:
     def __len__(self) -> int:
         return len(self.y)
 
+    def __reduce__(self) -> tuple[type[Experiment], tuple[Any, ...]]:
+        """Arrays come out of a pickle writable; made anew, they are not."""
+        return type(self), (self.name, self.u, self.y, self.dt)
+
     def __getitem__(self, samples: slice) -> Experiment:
         if not isinstance(samples, slice) or samples.step not in (None, 1):
             raise TypeError("an experiment is cut with a plain slice such as experiment[100:200]")

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from multiprocessing.context import BaseContext
 from pathlib import Path
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import CONSTS, ProcessExpired, ProcessPool
 
 from simgap.engines.engine import Event, Running
 from simgap.jobs import Job, execute, progress_file
@@ -26,6 +26,9 @@ from simgap.workers import Limits, prepare_worker
 # changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
 PRELOADED = ("simgap.jobs", "numba", "scipy.signal", "scipy.optimize", "scipy.stats")
 PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
+
+# Seconds between two looks of the pool at its processes, of which every job needs a new one.
+CONSTS.sleep_unit = 0.02
 
 
 @dataclass(frozen=True)

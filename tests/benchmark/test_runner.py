@@ -1,5 +1,6 @@
 import json
 import math
+import pickle
 import signal
 import subprocess
 import sys
@@ -270,3 +271,10 @@ def test_a_killed_training_carries_on_from_its_last_epoch(suite, tmp_path):
     assert row.fitted["train_loss"][: len(known)] == known
     assert any(0 < share < 1 for share in shares)  # of the one job, while it was under way
     assert not list((out / ".checkpoints").iterdir())
+
+
+def test_data_reach_a_worker_as_they_are_and_read_only(dataset):
+    again = pickle.loads(pickle.dumps(dataset))
+    assert again.sha256 == dataset.sha256 == again._digest()
+    for experiment in (*again.training.train, *again.training.valid, *again.test):
+        assert not (experiment.u.flags.writeable or experiment.y.flags.writeable)
