@@ -20,6 +20,9 @@ LARGEST_VALUE = 1e100
 class UnusableInput(ValueError):
     """What the user gave cannot be used; the message is one sentence that says where and what to do."""
 
+    def __init__(self, sentence: str) -> None:
+        super().__init__(" ".join(sentence.split()))  # what it quotes may hold line breaks
+
 
 @dataclass(frozen=True)
 class Channel:

@@ -130,7 +130,10 @@ class _Reader:
         """`name`, a path or `file.py:Class`, from the suite's own folder if there is such a file."""
         near = self.path.parent / name
         file = Path(str(near).rpartition(":")[0]) if ".py:" in name else near
-        return str(near) if file.exists() else name
+        try:
+            return str(near) if file.exists() else name
+        except (OSError, ValueError):  # a name that no file can have
+            return name
 
     def _get(self, name: str, kind: Any, default: Any) -> Any:
         value = self.table.get(name, default)

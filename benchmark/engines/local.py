@@ -100,7 +100,8 @@ def _how_it_ended(exitcode: int | None) -> str:
         with contextlib.suppress(ValueError):
             name = signal.Signals(-exitcode).name
             return f"was ended by {name}: a crash in compiled code, or the system had no memory left"
-    return f"ended with exit code {exitcode}: an exit by the model itself"
+    by_whom = "the process that starts workers was killed" if exitcode == 255 else "an exit by the model itself"
+    return f"ended with exit code {exitcode}: {by_whom}"
 
 
 @contextlib.contextmanager

@@ -200,6 +200,14 @@ class ChangesTheWorld(Mean):
         np.concatenate = None
 
 
+class Waits(Mean):
+    """For a minute, and says which process it is."""
+
+    def fit(self, data, seed):
+        Path("pid.txt").write_text(str(os.getpid()))
+        time.sleep(60)
+
+
 class SeesGpu(Mean):
     def fit(self, data, seed):
         super().fit(data, seed)

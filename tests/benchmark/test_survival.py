@@ -84,24 +84,15 @@ def test_killed_at_random_moments_the_next_run_finishes_what_is_missing(suite, t
 
 def test_a_killed_worker_is_a_row_and_the_run_goes_on(suite, tmp_path):
     out = tmp_path / "out"
-    chosen = suite("Hangs", "Mean", timeout=60)
-    with subprocess.Popen([*RUN, "run", chosen, "--jobs", "2", "--out", str(out)], stdout=subprocess.DEVNULL,
-                          start_new_session=True) as process:  # fmt: skip
-        while not (out / "mine" / "Mean.jsonl").exists():
+    command = [*RUN, "run", suite("Waits", "Mean"), "--out", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=tmp_path) as process:
+        while not (tmp_path / "pid.txt").exists() or not (tmp_path / "pid.txt").read_text():
             time.sleep(0.05)
-        busiest = max((pid for pid in family(process.pid)), key=seconds)
-        os.kill(busiest, signal.SIGKILL)
-        assert process.wait(timeout=30) == 1
+        os.kill(int((tmp_path / "pid.txt").read_text()), signal.SIGKILL)
+        assert process.wait(timeout=60) == 1
     rows = {row.model: row for row in store.read(out / "mine")}
     assert rows["Mean"].status == "ok"
-    assert "was ended by SIGKILL" in rows["Hangs"].message
-
-
-def seconds(pid):
-    """Processor time of a process in ticks, zero for one that is gone."""
-    with contextlib.suppress(OSError):
-        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11])
-    return 0
+    assert "was ended by SIGKILL" in rows["Waits"].message
 
 
 def test_two_runs_on_one_store_leave_every_row_once(suite, tmp_path):
@@ -126,7 +117,7 @@ def test_a_disk_that_fills_up_ends_the_run_with_a_sentence_and_loses_nothing(sui
     ended = subprocess.run(command, check=False, capture_output=True, text=True,
                            preexec_fn=full_disk, timeout=120)  # fmt: skip
     assert ended.returncode == 2
-    assert "cannot be read or written: File too large" in ended.stderr
+    assert "cannot be read or written" in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
     for line in lines_of(out):  # no torn line, even before the next run
         json.loads(line)
