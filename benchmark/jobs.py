@@ -111,7 +111,7 @@ def execute(job: Job) -> list[Result]:
 
 def _load(job: Job) -> Dataset:
     """The job's data, which may take seconds to make: the first job of a run leaves them for the others."""
-    folder = os.environ.get("SIMGAP_PROGRESS")
+    folder = os.environ.get("SIMGAP_RUN")
     if folder is None:
         return job.source.load()
     file = Path(folder) / f"{job.card.sha256}.data"
@@ -137,7 +137,7 @@ def progress_file(folder: str | Path, job: Job) -> Path:
 
 
 def _note_of(job: Job) -> Callable[[int, int], None] | None:
-    folder = os.environ.get("SIMGAP_PROGRESS")
+    folder = os.environ.get("SIMGAP_RUN")
     return None if folder is None else lambda done, total: _note(progress_file(folder, job), done, total)
 
 

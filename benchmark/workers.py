@@ -22,8 +22,8 @@ GIB = 1 << 30
 class Limits:
     """What one job may use: threads of the numerical libraries, seconds, and GiB of memory.
 
-    environment: variables that name where a model may keep what it needs to carry on (SIMGAP_CHECKPOINTS) and where
-    it notes how far it is (SIMGAP_PROGRESS).
+    environment: variables that name where a model may keep what it needs to carry on (SIMGAP_CHECKPOINTS), and the
+    folder of the run, where jobs note how far they are and leave data for each other (SIMGAP_RUN).
     """
 
     threads: int

@@ -44,7 +44,7 @@ class Local:
             return
         with _main_left_alone(), contextlib.ExitStack() as stack:
             notes = stack.enter_context(tempfile.TemporaryDirectory(prefix="simgap", ignore_cleanup_errors=True))
-            limits = replace(self.limits, environment=self.limits.environment | {"SIMGAP_PROGRESS": notes})
+            limits = replace(self.limits, environment=self.limits.environment | {"SIMGAP_RUN": notes})
             pool = ProcessPool(min(self.workers, len(todo)), max_tasks=1, initializer=prepare_worker,
                                initargs=(limits,), context=_context(todo))  # fmt: skip
             stack.callback(pool.join)

@@ -18,22 +18,17 @@ class _Pass(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, offset: Tensor, dilation: int, step: int) -> Tensor:
         values, w = x.detach().numpy(), weight.detach().numpy()
-        batch, steps, channels = values.shape
-        answers = -(-steps // step)
-        columns = np.empty((batch * answers, channels * w.shape[2]), values.dtype)
-        y = np.empty((batch, answers, len(w)), values.dtype)
-        kernels.run_conv(values, w, offset.detach().numpy(), dilation, step, columns, y)
-        ctx.rest = w, columns, y, dilation, step, values.shape
+        y = np.empty((len(values), -(-values.shape[1] // step), len(w)), values.dtype)
+        kernels.run_conv(values, w, offset.detach().numpy(), dilation, step, y)
+        ctx.rest = values, w, y, dilation, step
         return torch.from_numpy(y)
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        w, columns, y, dilation, step, (batch, steps, channels) = ctx.rest
-        wanted = ctx.needs_input_grad[0]
-        dw, d_offset = np.empty_like(w), np.empty(len(w), y.dtype)
-        dx = np.empty((batch, steps if wanted else 0, channels), y.dtype)
-        kernels.back_conv(w, columns, y, grads[0].contiguous().numpy(), dilation, step, dw, d_offset, dx)
-        return torch.from_numpy(dx) if wanted else None, torch.from_numpy(dw), torch.from_numpy(d_offset), None, None
+        x, w, y, dilation, step = ctx.rest
+        dw, d_offset, dx = np.empty_like(w), np.empty(len(w), y.dtype), _like(x, ctx.needs_input_grad[0])
+        kernels.back_conv(x, w, y, grads[0].contiguous().numpy(), dilation, step, dw, d_offset, dx)
+        return _tensor(dx), torch.from_numpy(dw), torch.from_numpy(d_offset), None, None
 
 
 class _Pooled(torch.autograd.Function):
@@ -41,26 +36,22 @@ class _Pooled(torch.autograd.Function):
     def forward(ctx: Any, x: Tensor, *weights: Tensor) -> Tensor:
         given = [value.detach().numpy() for value in weights]
         values = x.detach().numpy()
-        batch, steps, channels = values.shape
-        held = []
-        for w, answers, pooled in zip(given[::2], (steps, steps // 2, 1), (True, True, False), strict=True):
-            held.append(np.empty((batch * answers, channels * w.shape[2]), values.dtype))
-            held.append(np.empty((batch, answers, len(w)), values.dtype))
-            if pooled:
-                held.append(np.empty((batch, answers // 2, len(w)), values.dtype))
-            channels = len(w)
+        batch, steps, _ = values.shape
+        outputs = [len(w) for w in given[::2]]
+        sizes = ((steps, outputs[0]), (steps // 2, outputs[0]), (steps // 2, outputs[1]), (steps // 4, outputs[1]),
+                 (1, outputs[2]))  # fmt: skip
+        held = [np.empty((batch, *size), values.dtype) for size in sizes]
         kernels.run_pooled(values, *given, *held)
-        ctx.rest = given, held, values.shape
+        ctx.rest = values, given, held
         return torch.from_numpy(held[-1])
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        given, held, (batch, steps, channels) = ctx.rest
-        wanted = ctx.needs_input_grad[0]
+        x, given, held = ctx.rest
         found = [np.empty_like(value) for value in given]
-        dx = np.empty((batch, steps if wanted else 0, channels), given[0].dtype)
-        kernels.back_pooled(*given[::2], *held, grads[0].contiguous().numpy(), *found, dx)
-        return (torch.from_numpy(dx) if wanted else None, *map(torch.from_numpy, found))
+        dx = _like(x, ctx.needs_input_grad[0])
+        kernels.back_pooled(x, *given[::2], *held, grads[0].contiguous().numpy(), *found, dx)
+        return (_tensor(dx), *map(torch.from_numpy, found))
 
 
 class _Residual(torch.autograd.Function):
@@ -69,30 +60,30 @@ class _Residual(torch.autograd.Function):
         given = [value.detach().numpy() for value in weights]
         values = x.detach().numpy()
         batch, length, channels = values.shape
-        outputs, _, taps = given[0].shape
-        answers = -(-length // step)
-        rows = batch * length, batch * answers
-        columns = [
-            np.empty((rows[0], channels * taps), values.dtype),
-            np.empty((rows[1], outputs * taps), values.dtype),
-        ]
-        y1 = np.empty((batch, length, outputs), values.dtype)
-        y2, kept, y = (np.empty((batch, answers, size), values.dtype) for size in (outputs, channels, outputs))
-        held = columns[0], y1, columns[1], y2, kept, y
+        outputs, answers = len(given[0]), -(-length // step)
+        sizes = (length, outputs), (answers, outputs), (answers, channels), (answers, outputs)
+        held = [np.empty((batch, *size), values.dtype) for size in sizes]
         kernels.run_block(values, step, *given, dilation, *held)
-        ctx.rest = given, held, step, dilation, values.shape
-        return torch.from_numpy(y)
+        ctx.rest = values, given, held, step, dilation
+        return torch.from_numpy(held[-1])
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        given, held, step, dilation, (batch, length, channels) = ctx.rest
+        x, given, held, step, dilation = ctx.rest
         w1, _, w2, _, skip, _ = given
-        wanted = ctx.needs_input_grad[0]
         found = [np.empty_like(value) for value in given]
-        dx = np.empty((batch, length if wanted else 0, channels), w1.dtype)
-        dy = grads[0].contiguous().numpy()
-        kernels.back_block(step, w1, w2, skip, dilation, *held, dy, *found, dx)
-        return (torch.from_numpy(dx) if wanted else None, None, None, *map(torch.from_numpy, found))
+        dx = _like(x, ctx.needs_input_grad[0])
+        kernels.back_block(x, step, w1, w2, skip, dilation, *held, grads[0].contiguous().numpy(), *found, dx)
+        return (_tensor(dx), None, None, *map(torch.from_numpy, found))
+
+
+def _like(x: np.ndarray, wanted: bool) -> np.ndarray:
+    """Room for the gradient of x; without samples if nobody wants it."""
+    return np.empty_like(x if wanted else x[:, :0])
+
+
+def _tensor(dx: np.ndarray) -> Tensor | None:
+    return torch.from_numpy(dx) if dx.shape[1] else None
 
 
 class Residual(nn.Module):

@@ -1,12 +1,16 @@
 """Causal convolutions over time with ReLU, compiled: shifted samples side by side, one product, one bend.
 
-Arrays are x [B, T, C], weights [G, C, K] as in PyTorch, y [B, T, G]; tap K-1 meets the newest sample.
+Arrays are x [B, T, C], weights [G, C, K] as in PyTorch, y [B, S, G] with every `step`-th sample counted from the end;
+tap K-1 meets the newest sample.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+# Numbers in a matrix of shifted samples: a larger one is made piece by piece, because it would not fit into the cache.
+AT_ONCE = 1 << 17
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
@@ -22,44 +26,21 @@ def _by_taps(weight):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _unshift(columns, dilation, step, x):
-    """The sum of what was taken from every sample of x."""
-    batch, steps, channels = x.shape
-    taps = columns.shape[1] // channels
-    answers = columns.shape[0] // batch
-    first = steps - 1 - (answers - 1) * step - (taps - 1) * dilation
-    flat = x.reshape(batch, steps * channels)
-    x[:] = 0
-    for b in range(batch):
-        for s in range(answers):
-            row = columns[b * answers + s]
-            start = first + s * step
-            if dilation == 1 and start >= 0:  # the taps lie side by side
-                for i in range(taps * channels):
-                    flat[b, start * channels + i] += row[i]
-                continue
-            for j in range(taps):
-                source = start + j * dilation
-                if source >= 0:
-                    for c in range(channels):
-                        x[b, source, c] += row[j * channels + c]
+def _records(answers, columns):
+    """How many records are taken at once."""
+    return max(1, AT_ONCE // (answers * columns))
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def run_conv(x, weight, offset, dilation, step, columns, y):
-    """y(k) = ReLU(offset + sum over j of W_j x(k - (K-1-j) dilation)), zeros before the start.
-
-    Only every `step`-th sample counted from the end is computed, as many as y has. `columns` [B T, K C] is left for
-    the backward pass.
-    """
-    batch, steps, channels = x.shape
-    outputs, _, taps = weight.shape
-    answers = y.shape[1]
+def _shift(x, begin, end, dilation, step, answers, columns):
+    """The samples that meet the taps, side by side, of the records from `begin` to `end`."""
+    steps, channels = x.shape[1:]
+    taps = columns.shape[1] // channels
     first = steps - 1 - (answers - 1) * step - (taps - 1) * dilation
-    flat = x.reshape(batch, steps * channels)
-    for b in range(batch):
+    flat = x.reshape(x.shape[0], steps * channels)
+    for b in range(begin, end):
         for s in range(answers):
-            row = columns[b * answers + s]
+            row = columns[(b - begin) * answers + s]
             start = first + s * step
             if dilation == 1 and start >= 0:  # the taps lie side by side
                 for i in range(taps * channels):
@@ -73,37 +54,81 @@ def run_conv(x, weight, offset, dilation, step, columns, y):
                 else:
                     for c in range(channels):
                         row[j * channels + c] = 0
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _unshift(columns, begin, end, dilation, step, answers, x):
+    """The sum of what was taken from every sample of those records, added to x."""
+    steps, channels = x.shape[1:]
+    taps = columns.shape[1] // channels
+    first = steps - 1 - (answers - 1) * step - (taps - 1) * dilation
+    flat = x.reshape(x.shape[0], steps * channels)
+    for b in range(begin, end):
+        for s in range(answers):
+            row = columns[(b - begin) * answers + s]
+            start = first + s * step
+            if dilation == 1 and start >= 0:
+                for i in range(taps * channels):
+                    flat[b, start * channels + i] += row[i]
+                continue
+            for j in range(taps):
+                source = start + j * dilation
+                if source >= 0:
+                    for c in range(channels):
+                        x[b, source, c] += row[j * channels + c]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def run_conv(x, weight, offset, dilation, step, y):
+    """y(k) = ReLU(offset + sum over j of W_j x(k - (K-1-j) dilation)), zeros before the start."""
+    batch, answers, outputs = y.shape
+    flat = np.ascontiguousarray(_by_taps(weight).T)
     values = y.reshape(batch * answers, outputs)
-    np.dot(columns, _by_taps(weight).T, values)
+    at_once = _records(answers, flat.shape[0])
+    columns = np.empty((min(batch, at_once) * answers, flat.shape[0]), x.dtype)
+    for begin in range(0, batch, at_once):
+        end = min(batch, begin + at_once)
+        _shift(x, begin, end, dilation, step, answers, columns)
+        np.dot(columns[: (end - begin) * answers], flat, values[begin * answers : end * answers])
     for row in range(batch * answers):
         for g in range(outputs):
             values[row, g] = max(values[row, g] + offset[g], 0)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def back_conv(weight, columns, y, dy, dilation, step, d_weight, d_offset, dx):
+def back_conv(x, weight, y, dy, dilation, step, d_weight, d_offset, dx):
     """Gradients of the weights, of the offset and, where dx has samples, of x."""
     batch, answers, outputs = y.shape
     _, channels, taps = weight.shape
-    d = np.empty((batch * answers, outputs), y.dtype)
+    flat = _by_taps(weight)
+    of_columns = np.zeros((outputs, taps * channels), y.dtype)
+    at_once = _records(answers, taps * channels)
+    columns = np.empty((min(batch, at_once) * answers, taps * channels), y.dtype)
+    d = np.empty((min(batch, at_once) * answers, outputs), y.dtype)
     d_offset[:] = 0
-    for b in range(batch):
-        for s in range(answers):
-            row = d[b * answers + s]
-            for g in range(outputs):
-                row[g] = dy[b, s, g] if y[b, s, g] > 0 else 0
-                d_offset[g] += row[g]
-    of_columns = np.dot(d.T, columns)  # [G, K C]
+    dx[:] = 0
+    for begin in range(0, batch, at_once):
+        end = min(batch, begin + at_once)
+        rows = (end - begin) * answers
+        for b in range(begin, end):
+            for s in range(answers):
+                row = d[(b - begin) * answers + s]
+                for g in range(outputs):
+                    row[g] = dy[b, s, g] if y[b, s, g] > 0 else 0
+                    d_offset[g] += row[g]
+        _shift(x, begin, end, dilation, step, answers, columns)
+        of_columns += np.dot(d[:rows].T, columns[:rows])
+        if dx.shape[1] > 0:
+            np.dot(d[:rows], flat, columns[:rows])
+            _unshift(columns, begin, end, dilation, step, answers, dx)
     for g in range(outputs):
         for c in range(channels):
             for j in range(taps):
                 d_weight[g, c, j] = of_columns[g, j * channels + c]
-    if dx.shape[1] > 0:
-        _unshift(np.dot(d, _by_taps(weight)), dilation, step, dx)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, columns1, y1, columns2, y2, kept, y):
+def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, y1, y2, kept, y):
     """y = ReLU(conv(conv(x)) + skip x) at every `step`-th sample counted from the end; an empty `skip` is the identity.
 
     The samples of x that are skipped to are left in `kept`.
@@ -115,8 +140,8 @@ def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, columns1, y1
         for s in range(answers):
             for c in range(channels):
                 kept[b, s, c] = x[b, first + s * step, c]
-    run_conv(x, w1, o1, dilation, 1, columns1, y1)
-    run_conv(y1, w2, o2, dilation, step, columns2, y2)
+    run_conv(x, w1, o1, dilation, 1, y1)
+    run_conv(y1, w2, o2, dilation, step, y2)
     if skip.shape[0]:
         around = np.dot(kept.reshape(batch * answers, channels), skip.T).reshape(y.shape)
         for b in range(batch):
@@ -131,9 +156,7 @@ def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, columns1, y1
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def back_block(
-    step, w1, w2, skip, dilation, columns1, y1, columns2, y2, kept, y, dy, dw1, do1, dw2, do2, d_skip, do_skip, dx
-):
+def back_block(x, step, w1, w2, skip, dilation, y1, y2, kept, y, dy, dw1, do1, dw2, do2, d_skip, do_skip, dx):
     """Backward pass of `run_block`; without samples in dx its gradient is left out."""
     batch, answers, outputs = y.shape
     channels = kept.shape[2]
@@ -142,8 +165,8 @@ def back_block(
         for s in range(answers):
             for g in range(outputs):
                 d[b, s, g] = dy[b, s, g] if y[b, s, g] > 0 else 0
-    back_conv(w2, columns2, y2, d, dilation, step, dw2, do2, dy1)
-    back_conv(w1, columns1, y1, dy1, dilation, 1, dw1, do1, dx)
+    back_conv(y1, w2, y2, d, dilation, step, dw2, do2, dy1)
+    back_conv(x, w1, y1, dy1, dilation, 1, dw1, do1, dx)
     flat = d.reshape(batch * answers, outputs)
     if skip.shape[0]:
         d_skip[:] = np.dot(flat.T, kept.reshape(batch * answers, channels))
@@ -179,24 +202,22 @@ def _double(d_mean, dy):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def run_pooled(x, w1, o1, w2, o2, w3, o3, columns1, y1, mean1, columns2, y2, mean2, columns3, y3):
+def run_pooled(x, w1, o1, w2, o2, w3, o3, y1, mean1, y2, mean2, y3):
     """Two convolutions, each followed by the mean of each two samples, and a third one at the last sample."""
-    run_conv(x, w1, o1, 1, 1, columns1, y1)
+    run_conv(x, w1, o1, 1, 1, y1)
     _halve(y1, mean1)
-    run_conv(mean1, w2, o2, 1, 1, columns2, y2)
+    run_conv(mean1, w2, o2, 1, 1, y2)
     _halve(y2, mean2)
-    run_conv(mean2, w3, o3, 1, mean2.shape[1], columns3, y3)
+    run_conv(mean2, w3, o3, 1, mean2.shape[1], y3)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def back_pooled(
-    w1, w2, w3, columns1, y1, mean1, columns2, y2, mean2, columns3, y3, dy3, dw1, do1, dw2, do2, dw3, do3, dx
-):
+def back_pooled(x, w1, w2, w3, y1, mean1, y2, mean2, y3, dy3, dw1, do1, dw2, do2, dw3, do3, dx):
     """Backward pass of `run_pooled`; without samples in dx its gradient is left out."""
     d_mean1, d_mean2 = np.empty_like(mean1), np.empty_like(mean2)
     dy1, dy2 = np.empty_like(y1), np.empty_like(y2)
-    back_conv(w3, columns3, y3, dy3, 1, mean2.shape[1], dw3, do3, d_mean2)
+    back_conv(mean2, w3, y3, dy3, 1, mean2.shape[1], dw3, do3, d_mean2)
     _double(d_mean2, dy2)
-    back_conv(w2, columns2, y2, dy2, 1, 1, dw2, do2, d_mean1)
+    back_conv(mean1, w2, y2, dy2, 1, 1, dw2, do2, d_mean1)
     _double(d_mean1, dy1)
-    back_conv(w1, columns1, y1, dy1, 1, 1, dw1, do1, dx)
+    back_conv(x, w1, y1, dy1, 1, 1, dw1, do1, dx)

@@ -10,6 +10,7 @@ import pytest
 
 import simgap
 from simgap import store
+from simgap.baselines import arx
 from simgap.cli import main
 from simgap.records import Result, UnusableInput
 from simgap.regression import ON_AVERAGE, compare
@@ -122,3 +123,41 @@ def test_what_cannot_be_compared_is_refused(tmp_path, new, reference, complaint)
     (tmp_path / "empty").mkdir()
     with pytest.raises(UnusableInput, match=complaint):
         simgap.check(tmp_path / new, tmp_path / reference)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """`reference("arx")` are the committed rows of that model on the small data set."""
+    rows = store.read(REFERENCE / "smoke")
+    return lambda model: [row for row in rows if row.model == model]
+
+
+def test_the_committed_results_are_met_again_by_arx_and_a_planted_bug_of_1e_4_is_found(reference, monkeypatch):
+    def compared():
+        return compare("smoke", reference("arx"), simgap.fit("arx", "gimbal_short").results)
+
+    assert {one.verdict for one in compared()} == {"same"}
+    honest = arx.estimate_arx
+
+    def planted(*arguments):
+        fit = honest(*arguments)
+        return replace(fit, polynomial=replace(fit.polynomial, b=fit.polynomial.b * (1 + 1e-4)))
+
+    monkeypatch.setattr(arx, "estimate_arx", planted)
+    assert "worse" in {one.verdict for one in compared()}
+
+
+def test_a_planted_loss_of_a_tenth_of_grus_accuracy_is_found(reference):
+    def grown(row, factor):
+        figures = {
+            output: values | {"rmse": values["rmse"] * factor}
+            | {name: {h: v * factor for h, v in values[name].items()} for name in values if name == "rmse_by_horizon"}
+            for output, values in row.metrics.items()
+        }  # fmt: skip
+        return replace(row, metrics=figures)
+
+    rows = reference("gru")
+    assert len({row.seed for row in rows}) >= 3
+    run = [row for row in rows if row.seed == 0]
+    assert {one.verdict for one in compare("smoke", rows, run)} == {"same"}
+    assert "worse" in {one.verdict for one in compare("smoke", rows, [grown(row, 1.1) for row in run])}

@@ -12,7 +12,8 @@ from simgap.records import Result, UnusableInput
 RESULT = Result(
     model="arx", params={"na": 2}, dataset="tanks", experiment="test", task="free_run", seed=0,
     status="diverged",
-    metrics={"y": {"rmse": math.inf, "fit_percent": -math.inf, "n_scored": 9, "std": 1.5, "rmse_by_horizon": {"1": 0.1}}},
+    metrics={"y": {"rmse": math.inf, "fit_percent": -math.inf, "n_scored": 9, "std": 1.5, "rmse_by_horizon": {"1": 0.1}}
+             },
     units={"y": "°"}, fitted={"text": "inf"}, n_params=4, fit_seconds=0.1, message="a\nb",
 )  # fmt: skip
 
