@@ -80,9 +80,16 @@ def _read(folder: Path) -> dict[str, list[Result]]:
     return suites
 
 
+_ABOUT = {
+    "smoke": "The reference of `simgap check`: a small data set, on which the networks are hardly trained. It says "
+    "whether a change of the code changed a figure, not which model is good.",
+}
+
+
 def _page(tables: dict[str, list[Table]]) -> str:
     parts = ["# Leaderboard\n", _HOW_TO_READ + "\n"]
     for suite, listed in tables.items():
         parts.append(f"## Suite {escape(suite)}\n")
+        parts += [f"{_ABOUT[suite]}\n"] if suite in _ABOUT else []
         parts += [to_markdown(table, level=3) for table in listed]
     return "\n".join([*parts, published_markdown()])
