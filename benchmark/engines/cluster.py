@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import socket
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from simgap.workers import Limits
 RETRIES = 5
 # Jobs handed to Ray beyond those that its processors can take, so that no node waits for this process.
 AHEAD = 2
+PATIENCE = 10.0  # seconds, for an answer of the cluster
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
@@ -41,7 +43,7 @@ class Cluster:
         except ImportError as error:
             raise UnusableInput("--engine ray: Ray is not installed: pip install 'simgap[ray]'") from error
         with _connected(ray, self.address):
-            task = ray.remote(_on_a_node).options(num_cpus=self.limits.threads, max_retries=RETRIES)
+            task = ray.remote(num_cpus=self.limits.threads, max_retries=RETRIES)(_on_a_node)
             waiting = [_with_absolute_paths(job) for job in reversed(todo)]
             at_once = max(8, int(AHEAD * ray.cluster_resources().get("CPU", 1)))
             pending: dict[Any, Job] = {}
@@ -77,11 +79,14 @@ def _connected(ray: Any, address: str | None) -> Iterator[None]:
     if ray.is_initialized():
         yield
         return
+    address = address or os.environ.get("RAY_ADDRESS", "auto")
     try:
-        ray.init(address=address or "auto", log_to_driver=False, logging_level="ERROR")
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        text = " ".join(str(error).split())[:200]
-        raise UnusableInput(f"--engine ray: there is no cluster at {address or 'RAY_ADDRESS'}: {text}") from error
+        if address != "auto":  # Ray itself would try for minutes
+            host, _, port = address.removeprefix("ray://").rpartition(":")
+            socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+    except (OSError, ValueError, RuntimeError) as error:
+        raise UnusableInput(f"--engine ray: there is no cluster at {address}: {str(error)[:200]}") from error
     try:
         yield
     finally:
