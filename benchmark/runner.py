@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,6 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
-ENGINES = ("local", "ray")
 
 
 def run(
@@ -55,14 +55,14 @@ def run(
     read CSV files. `jobs` is how many run at a time on this machine; with engine "ray" they go to the Ray cluster
     at `address` instead. What is stored for the same data is not computed again. Raises UnusableInput.
     """
-    if engine not in ENGINES:
-        raise UnusableInput(f"the engine {engine!r} is not known; choose one of {', '.join(ENGINES)}")
-    if address is not None and engine == "local":
-        raise UnusableInput("--address is for --engine ray: the engine local needs none")
     if jobs < 1:
         raise UnusableInput(f"--jobs {jobs}: give at least one worker")
     tell = progress or _log_notes
     chosen = planning.with_seeds(load_suite(suite), seeds)
+    threads = threads_per_worker(jobs) if engine == "local" else 1
+    # What an interrupted fit left to carry on from; gone with the fit.
+    folders = {"SIMGAP_CHECKPOINTS": str(Path(out).absolute() / ".checkpoints")}
+    execute = _engine(engine, jobs, address, Limits(threads, chosen.timeout, chosen.memory, folders))
 
     def note(text: str) -> None:
         tell(Progress(note=text))
@@ -70,7 +70,6 @@ def run(
     entries = planning.choose_entries(chosen, _listed(models), _listed(model), note)
     sources = planning.sources(_listed(datasets), _listed(inputs), _listed(outputs), dt)
     data = planning.choose_data(chosen, sources, note)
-    threads = threads_per_worker(jobs) if engine == "local" else 1
     planned = planning.plan(chosen, entries, data, provenance(threads))
     folder = store.writable(Path(out))
 
@@ -80,9 +79,6 @@ def run(
     if len(todo) < len(planned):
         note(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")
     results = [row for rows in stored for row in rows]
-    # What an interrupted fit left to carry on from; gone with the fit.
-    folders = {"SIMGAP_CHECKPOINTS": str(folder.absolute() / ".checkpoints")}
-    execute = _engine(engine, jobs, address, Limits(threads, chosen.timeout, chosen.memory, folders))
     ended = 0
     with contextlib.closing(execute(todo)) as events:
         for event in events:
@@ -104,10 +100,17 @@ def _under_way(ended: int, total: int, running: tuple[Running, ...]) -> Progress
 
 
 def _engine(name: str, jobs: int, address: str | None, limits: Limits) -> Engine:
+    """Raises UnusableInput for one that cannot be used."""
     if name == "local":
+        if address is not None:
+            raise UnusableInput("--address is for --engine ray: the engine local needs none")
         return Local(jobs, limits)
+    if name != "ray":
+        raise UnusableInput(f"the engine {name!r} is not known; choose local or ray")
     from simgap.engines.cluster import Cluster
 
+    if not (address := address or os.environ.get("RAY_ADDRESS")):
+        raise UnusableInput("--engine ray: say where the cluster is: --address HOST:PORT")
     return Cluster(limits, address)
 
 

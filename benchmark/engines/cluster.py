@@ -32,16 +32,27 @@ class Cluster:
     """
 
     limits: Limits
-    address: str | None = None
+    address: str
+
+    def __post_init__(self) -> None:
+        """Raises UnusableInput, before any work is done, when Ray is missing or nobody answers at the address."""
+        try:
+            import ray  # type: ignore[import-not-found]  # noqa: F401
+        except ImportError as error:
+            raise UnusableInput("--engine ray: Ray is not installed: pip install 'simgap[ray]'") from error
+        if self.address != "auto":  # Ray itself would try for minutes
+            try:
+                host, _, port = self.address.removeprefix("ray://").rpartition(":")
+                socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+            except (OSError, ValueError) as error:
+                raise UnusableInput(f"--engine ray: there is no cluster at {self.address}: {error}") from error
 
     def __call__(self, todo: Sequence[Job]) -> Generator[Event, None, None]:
         """Rows as they come; what is under way is Ray's to tell."""
         if not todo:
             return
-        try:
-            import ray  # type: ignore[import-not-found]
-        except ImportError as error:
-            raise UnusableInput("--engine ray: Ray is not installed: pip install 'simgap[ray]'") from error
+        import ray  # type: ignore[import-not-found]
+
         with _connected(ray, self.address):
             task = ray.remote(num_cpus=self.limits.threads, max_retries=RETRIES)(_on_a_node)
             waiting = [_with_absolute_paths(job) for job in reversed(todo)]
@@ -74,16 +85,12 @@ def _on_a_node(job: Job, limits: Limits) -> list[Result]:
 
 
 @contextlib.contextmanager
-def _connected(ray: Any, address: str | None) -> Iterator[None]:
+def _connected(ray: Any, address: str) -> Iterator[None]:
     """A connection to the cluster; one that the caller's script has made is used and left as it is."""
     if ray.is_initialized():
         yield
         return
-    address = address or os.environ.get("RAY_ADDRESS", "auto")
     try:
-        if address != "auto":  # Ray itself would try for minutes
-            host, _, port = address.removeprefix("ray://").rpartition(":")
-            socket.create_connection((host, int(port)), timeout=PATIENCE).close()
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except (OSError, ValueError, RuntimeError) as error:
         raise UnusableInput(f"--engine ray: there is no cluster at {address}: {str(error)[:200]}") from error

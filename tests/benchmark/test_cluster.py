@@ -92,4 +92,4 @@ def test_a_node_with_other_code_of_the_model_says_so(suite, tmp_path, example):
 def test_ray_missing_is_said_in_one_sentence(suite, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(UnusableInput, match="Ray is not installed"):
-        simgap.run(suite("Mean"), engine="ray", out=tmp_path / "out")
+        simgap.run(suite("Mean"), engine="ray", address="auto", out=tmp_path / "out")
