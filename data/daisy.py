@@ -22,11 +22,15 @@ from simgap.registry import DATASETS
 SITE = "https://homes.esat.kuleuven.be/~smc/daisy/daisydata.html"
 FILES = "https://ftp.esat.kuleuven.be/pub/SISTA/data"
 TIMEOUT = 60  # s
+LARGEST = 64 << 20  # bytes of an unpacked file; a few kilobytes may unpack to gigabytes
 
 
 def _download(address: str, stem: str, folder: Path) -> None:
     with urllib.request.urlopen(f"{FILES}/{address}.dat.gz", timeout=TIMEOUT) as answer:
-        (folder / f"{stem}.dat").write_bytes(gzip.decompress(answer.read()))
+        unpacked = gzip.GzipFile(fileobj=answer).read(LARGEST + 1)
+    if len(unpacked) > LARGEST:
+        raise ValueError(f"{stem} is larger than {LARGEST >> 20} MiB, which none of these sets is")
+    (folder / f"{stem}.dat").write_bytes(unpacked)
 
 
 def _columns(folder: Path, stem: str, count: int) -> Float[np.ndarray, "T columns"]:

@@ -58,6 +58,7 @@ def test_a_daisy_set_is_fetched_once_and_then_loads(site, no_files):
         packed(BEAM)[:500],
         packed(BEAM[:, :1]),
         packed(BEAM * np.nan),
+        gzip.compress(bytes((64 << 20) + 1), mtime=0),  # 65 kilobytes
     ],
 )
 def test_a_failed_download_leaves_nothing_and_says_where_to_get_it_by_hand(site, no_files, answer):
