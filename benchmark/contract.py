@@ -88,12 +88,8 @@ def candidate(reference: str, params: dict[str, Any] | None = None) -> Candidate
 Check = Callable[[Candidate], None]
 
 
-def it_has_fit_simulate_and_a_docstring(candidate: Candidate) -> None:
-    model = candidate.build()
-    for method in ("fit", "simulate"):
-        if not callable(getattr(model, method, None)):
-            raise ModelFault(f"there is no method {method}")
-    if not (type(model).__doc__ or "").strip():
+def it_has_a_docstring(candidate: Candidate) -> None:
+    if not (type(candidate.build()).__doc__ or "").strip():
         raise ModelFault("the class has no docstring; its first line stands in `simgap list models`")
 
 
@@ -189,7 +185,7 @@ def toy_errors(candidate: Candidate) -> tuple[float, float]:
 
 
 CHECKS: tuple[Check, ...] = (
-    it_has_fit_simulate_and_a_docstring,
+    it_has_a_docstring,
     it_fits_and_says_plainly_what_it_chose,
     it_returns_the_rows_after_the_start_as_float64,
     it_leaves_its_inputs_as_they_were,

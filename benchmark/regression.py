@@ -6,6 +6,7 @@ import math
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -114,7 +115,6 @@ class _Group:
 
     def row_by_row(self, seeds: set[int]) -> Iterator[Comparison]:
         """Every figure of every row of the reference whose seed was run."""
-        spread = self._spread()
         after = {store.key(row): row for row in self.after}
         for row in self.before:
             if row.seed not in seeds:
@@ -126,7 +126,7 @@ class _Group:
                 continue
             figures = _figures(now)
             for name, (value, scale) in _figures(row).items():
-                limit = value + self._allowed(value, spread.get(name, 0.0), scale)
+                limit = value + self._allowed(value, self._spread.get(name, 0.0), scale)
                 figure = ", ".join(name)
                 if name not in figures:
                     yield self._comparison(figure, row.seed, value, None, limit, "missing", now.message or now.status)
@@ -137,7 +137,7 @@ class _Group:
         """The geometric mean of all figures of both, which spreads less than each of them."""
         before, after = _means(self.before), _means(self.after)
         shared = sorted(before.keys() & after.keys())
-        if not shared or not self._spread():
+        if not shared or not self._spread:
             return
         was, is_now = (math.exp(statistics.fmean(of[seed] for seed in shared)) for of in (before, after))
         sigma = statistics.stdev(before.values()) / math.sqrt(len(shared)) if len(before) > 1 else 0.0
@@ -165,6 +165,7 @@ class _Group:
     ) -> Comparison:  # fmt: skip
         return Comparison(self.suite, self.model, self.dataset, figure, seed, before, after, limit, verdict, why)
 
+    @cached_property
     def _spread(self) -> dict[Name, float]:
         """Standard deviation over the reference's seeds of each figure that has several and differs among them."""
         values: dict[Name, list[float]] = {}

@@ -65,7 +65,7 @@ def append(folder: Path, suite: str, results: Sequence[Result]) -> None:
         by_path.setdefault(path_of(folder, suite, result.model), []).append(result)
     for path, rows in by_path.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        lines = "".join(encode(row) + "\n" for row in rows).encode()
+        lines = _lines(rows)
         with FileLock(Path(folder) / ".lock"), path.open("r+b" if path.exists() else "w+b", buffering=0) as file:
             size = _mend(file)
             try:
@@ -90,7 +90,7 @@ def tidy(folder: Path, suite: str, model: str) -> None:
         if len(rows) == path.read_bytes().count(b"\n"):
             return
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}", delete=False) as file:
-            file.write("".join(encode(row) + "\n" for row in rows).encode())
+            file.write(_lines(rows))
             file.flush()
             os.fsync(file.fileno())
         Path(file.name).replace(path)
@@ -138,6 +138,10 @@ def plain(value: Any) -> Any:
     if isinstance(value, int | bool | None):
         return value
     return str(value).encode("utf-8", "replace").decode()  # half of a pair of surrogates is no UTF-8
+
+
+def _lines(rows: Sequence[Result]) -> bytes:
+    return "".join(encode(row) + "\n" for row in rows).encode()
 
 
 def _mend(file: FileIO) -> int:

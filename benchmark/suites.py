@@ -81,8 +81,8 @@ class _Reader:
             models=tuple(self._models()),
             tasks=tuple(str(task) for task in self._get("tasks", list, list(USUAL))),
             seeds=self._get("seeds", int, 1),
-            timeout=float(self._get("timeout", (int, float), 3600)),
-            memory=float(self._get("memory", (int, float), 8)),
+            timeout=float(self._get("timeout", (int, float), Suite.timeout)),
+            memory=float(self._get("memory", (int, float), Suite.memory)),
         )
         for task in suite.tasks:
             if task not in TASKS:

@@ -9,6 +9,7 @@ from simgap.regression import Comparison, Regression
 from simgap.reports.rendering import to_markdown
 from simgap.reports.tables import Cell, Table
 
+HEADINGS = ["model", "data set", "figure", "seed", "before", "after", "limit", "verdict"]
 # Rows of what went wrong; the rest is counted.
 MOST = 40
 
@@ -31,9 +32,6 @@ def to_text(regression: Regression) -> str:
     parts.append(to_markdown(Table("All models", HEADINGS, [_cells(one) for one in _nearest(regression)]), 3))
     parts.append("</details>\n")
     return "\n".join(parts)
-
-
-HEADINGS = ["model", "data set", "figure", "seed", "before", "after", "limit", "verdict"]
 
 
 def _cells(one: Comparison) -> list[Cell]:
