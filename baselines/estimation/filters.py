@@ -10,7 +10,8 @@ from scipy.signal import lfilter
 
 def multiply(b: np.ndarray | Sequence[float], signal: np.ndarray, axis: int = -1) -> np.ndarray:
     """B(q) x: y(t) = sum_k b_k x(t-k)."""
-    return np.asarray(lfilter(b, [1.0], signal, axis=axis))
+    # The zero keeps SciPy from convolving row by row in Python, as it does without a denominator.
+    return np.asarray(lfilter(b, [1.0, 0.0], signal, axis=axis))
 
 
 def divide(signal: np.ndarray, f: np.ndarray | Sequence[float], axis: int = -1) -> np.ndarray:

@@ -68,22 +68,21 @@ def rough_means(experiments: Sequence[Experiment], offset: bool = True) -> Float
 def lagged_gram(experiments: Sequence[Experiment], shift: Float[np.ndarray, " S"], max_lag: int) -> Gram:
     """Accumulate the products of all lags 0..max_lag over every experiment, each on its own."""
     count, lags = len(shift), max_lag + 1
-    products, sums = np.zeros((count, lags, count, lags)), np.zeros((count, lags))
+    first, first_sum = np.zeros((count, count, lags)), np.zeros(count)  # [i, j, l]: sum_t x_i(t) x_j(t-l)
     long_enough = tuple(experiment for experiment in experiments if len(experiment) > max_lag)
     for experiment in long_enough:
-        first = np.zeros((count, count, lags))  # [i, j, l]: sum_t x_i(t) x_j(t-l)
-        first_sum = np.zeros(count)
         for signals in _chunks(experiment, shift, max_lag):
             first_sum += signals[:, max_lag:].sum(axis=1)
             for i in range(count):
                 for j in range(count):
                     first[i, j] += np.correlate(signals[j], signals[i, max_lag:], "valid")[::-1]
-        head, tail = _edges(experiment, shift, max_lag)
-        products += _shift_down(first, head, tail)
-        sums[:, 0] += first_sum
-        sums[:, 1:] += first_sum[:, None] + np.cumsum(head - tail, axis=1)
+    edges = np.zeros((2, len(long_enough), count, max_lag))
+    for e, experiment in enumerate(long_enough):
+        edges[:, e] = _edges(experiment, shift, max_lag)
+    sums = first_sum[:, None] + np.zeros(lags)
+    sums[:, 1:] += np.cumsum((edges[0] - edges[1]).sum(axis=0), axis=1)
     rows = sum(len(experiment) - max_lag for experiment in long_enough)
-    return Gram(long_enough, shift, products, sums, rows)
+    return Gram(long_enough, shift, _shift_down(first, *edges), sums, rows)
 
 
 def _chunks(experiment: Experiment, shift: Float[np.ndarray, " S"], max_lag: int) -> Iterator[np.ndarray]:
@@ -111,13 +110,15 @@ def _edges(
 
 
 def _shift_down(
-    first: Float[np.ndarray, "S S L1"], head: Float[np.ndarray, "S L"], tail: Float[np.ndarray, "S L"]
+    first: Float[np.ndarray, "S S L1"], heads: Float[np.ndarray, "E S L"], tails: Float[np.ndarray, "E S L"]
 ) -> Float[np.ndarray, "S L1 S L1"]:
+    """All lags from the products with lag 0, the edges of all experiments together."""
     count, _, lags = first.shape
     products = np.empty((count, lags, count, lags))
     products[:, 0] = first
     products[:, :, :, 0] = first.transpose(1, 2, 0)
     for k in range(lags - 1):
-        change = np.multiply.outer(head[:, k], head) - np.multiply.outer(tail[:, k], tail)  # [S, S, L]
+        change = np.tensordot(heads[:, :, k], heads, axes=(0, 0))  # [S, S, L]
+        change -= np.tensordot(tails[:, :, k], tails, axes=(0, 0))
         products[:, k + 1, :, 1:] = products[:, k, :, :-1] + change
     return products

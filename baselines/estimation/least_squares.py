@@ -87,13 +87,15 @@ def _left_over(gram: Gram, columns: _Columns, theta: np.ndarray) -> tuple[np.nda
     scale = columns.scale
     coefficients = theta * scale[-1] / scale[:-1]
     constant = _constant(gram, columns, coefficients)
-    gradient, squares = np.zeros(len(theta)), 0.0
-    for lagged in _pieces(gram, columns):
-        residual = lagged[-1] - constant
-        for coefficient, column in zip(coefficients, lagged[:-1], strict=True):
-            residual -= coefficient * column
-        gradient += [column @ residual for column in lagged[:-1]]
+    filters = np.zeros(gram.sums.shape)  # [S, L+1]: what residual(t) takes of each signal at each lag
+    np.add.at(filters, (columns.signal, columns.lag), np.append(-coefficients, 1.0))
+    products, squares = np.zeros(gram.sums.shape), 0.0
+    for signals in gram.chunks():
+        taken = (np.convolve(signal, taps, "valid") for signal, taps in zip(signals, filters, strict=True))
+        residual = sum(taken) - constant
+        products += [np.correlate(signal, residual, "valid")[::-1] for signal in signals]
         squares += float(residual @ residual)
+    gradient = products[columns.signal[:-1], columns.lag[:-1]]
     return gradient / scale[:-1] / scale[-1], squares / scale[-1] ** 2
 
 

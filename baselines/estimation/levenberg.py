@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +21,24 @@ class Cost:
     squares: float
     gradient: Float[np.ndarray, " p"]
     hessian: Float[np.ndarray, "p p"]
+
+
+@runtime_checkable
+class Equation(Protocol):
+    """An error e(theta) whose squares are to be as small as they can be."""
+
+    @property
+    def samples(self) -> int:
+        """How many errors count."""
+
+    def squares(self, theta: Float[np.ndarray, " p"]) -> float:
+        """|e|^2, which takes a fraction of the time of the slopes."""
+
+    def cost(self, theta: Float[np.ndarray, " p"]) -> Cost:
+        """|e|^2, half its gradient and J' J."""
+
+    def allowed(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
+        """The stable points that may stand for a trial point."""
 
 
 def sum_up(linearised: Iterable[tuple[np.ndarray, np.ndarray]]) -> Cost:
@@ -43,37 +62,32 @@ class Minimum:
     converged: bool
 
 
-def minimise(
-    cost_at: Callable[[np.ndarray], Cost],
-    theta: Float[np.ndarray, " p"],
-    allowed: Callable[[np.ndarray], list[np.ndarray]],
-    samples: int,
-    max_steps: int = 200,
-) -> Minimum:
-    """Minimise |e(theta)|^2; `allowed` gives the stable points that may stand for a trial point.
+def minimise(equation: Equation, theta: Float[np.ndarray, " p"], max_steps: int = 200) -> Minimum:
+    """Minimise |e(theta)|^2 over the stable points.
 
     Converged is when the gain that the quadratic model promises, g' H^-1 g, is a millionth of the variance: then
     theta is within a thousandth of a standard error, whatever its scale (Ljung 1999, section 10.2; Marquardt 1963).
     """
-    tolerance = 1e-6 / samples
-    cost, damping = cost_at(theta), 1e-3
-    history = [cost.squares]
+    tolerance = 1e-6 / equation.samples
+    cost, damping = equation.cost(theta), 1e-3
+    history = [equation.squares(theta)]  # not those of the costs, which are rounded in another way
     for _ in range(max_steps):
+        squares = history[-1]
         scale = np.sqrt(np.diag(cost.hessian))
         scale[scale == 0] = 1.0
         hessian, gradient = cost.hessian / scale / scale[:, None], cost.gradient / scale
         promised = gradient @ np.linalg.lstsq(hessian, gradient, rcond=1e-14)[0]
         # The second rule ends a crawl along the edge of the stable region, where the promise is never kept.
-        crawls = len(history) > CRAWL and history[-CRAWL - 1] - cost.squares <= 1e-5 * cost.squares
-        if promised <= tolerance * cost.squares or crawls:
+        crawls = len(history) > CRAWL and history[-CRAWL - 1] - squares <= 1e-5 * squares
+        if promised <= tolerance * squares or crawls:
             return Minimum(theta, cost, True)
         while damping < 1e12:
             step = np.linalg.solve(hessian + damping * np.eye(len(theta)), gradient) / scale
-            trials = [(point, cost_at(point)) for point in allowed(theta - step)]
-            point, trial = min(trials, key=lambda pair: pair[1].squares)
-            if trial.squares < cost.squares:
-                theta, cost, damping = point, trial, max(damping / 10, 1e-12)
-                history.append(cost.squares)
+            trials = [(equation.squares(point), point) for point in equation.allowed(theta - step)]
+            trial, point = min(trials, key=lambda pair: pair[0])
+            if trial < squares:
+                theta, cost, damping = point, equation.cost(point), max(damping / 10, 1e-12)
+                history.append(trial)
                 break
             damping *= 4
         else:

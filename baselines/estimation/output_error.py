@@ -46,8 +46,8 @@ def estimate_oe(
             begin = [equation.theta_of(start.rows[i])]
         else:
             candidates = oe_starts(experiments, shift, orders, i, equation)
-            begin = sorted(candidates, key=lambda theta: equation.cost(theta).squares)[:2]
-        searches = [minimise(equation.cost, theta, equation.allowed, samples) for theta in begin]
+            begin = sorted(candidates, key=equation.squares)[:2]
+        searches = [minimise(equation, theta) for theta in begin]
         best = min(searches, key=lambda search: search.cost.squares)
         names = equation.names
         rows.append(Row.at(best, names, range(len(names)), samples))
@@ -154,6 +154,10 @@ class OutputError:
                 candidate[part.start : part.start + self.nf[j]] = choice[1:]
         return candidates if (candidates[0] != candidates[1]).any() else candidates[:1]
 
+    def squares(self, theta: np.ndarray) -> float:
+        """|e|^2."""
+        return sum(float(np.vdot(run.counted, run.counted)) for run in self._runs(theta))
+
     def cost(self, theta: np.ndarray) -> Cost:
         """|e|^2, half its gradient and J' J."""
         return sum_up(self.linearised(theta))
@@ -164,20 +168,23 @@ class OutputError:
         de/db_k = -q^-k u/F and de/df_k = q^-k (B/F) u/F (Ljung 1999, eq. 10.50). The start is eliminated by variable
         projection: e = P r with P = 1 - R pinv(R_n) over the first n samples (Golub and Pereyra 1973).
         """
+        for run in self._runs(theta):
+            n, slope = run.inverse.shape[1], self._slope(theta, run)
+            slope -= slope[:, :, :n] @ run.inverse.T @ run.free.T
+            if n < run.e.shape[1]:
+                self._add_change_of_fit(slope, theta, run)
+                slope = slope[:, :, n:]
+            yield run.counted, slope
+
+    def _runs(self, theta: np.ndarray) -> Iterator[_Run]:
+        """The simulation of each group, from the start that suits it best."""
         for u, y in zip(self.u, self.y, strict=True):
             filtered = {j: divide(u[:, :, j], f) for j, _, f, _ in self.split(theta)}
             responses = {j: multiply(b, filtered[j]) for j, b, _, _ in self.split(theta)}
             residual = y - np.sum(list(responses.values()), axis=0) - (theta[-1] if self.constant else 0.0)
             free, inverse = self._free_responses(theta, y.shape[1])
-            n = inverse.shape[1]
-            start = residual[:, :n] @ inverse.T @ free.T  # what the plant's past adds to the output
-            e = residual - start
-            slope = self._slope(theta, filtered, responses, start)
-            slope -= slope[:, :, :n] @ inverse.T @ free.T
-            if n < y.shape[1]:
-                self._add_change_of_fit(slope, theta, free, inverse, e[:, :n])
-                e, slope = e[:, n:], slope[:, :, n:]
-            yield e, slope
+            start = residual[:, : inverse.shape[1]] @ inverse.T @ free.T
+            yield _Run(filtered, responses, free, inverse, start, residual - start)
 
     def _free_responses(self, theta: np.ndarray, length: int) -> tuple[np.ndarray, np.ndarray]:
         """R [T, N], and the pseudo-inverse [N, n] of its first n_start rows."""
@@ -185,29 +192,49 @@ class OutputError:
         free = divide(np.eye(self.state, length), common).T
         return free, np.linalg.pinv(free[: self.n_start], rcond=1e-10)
 
-    def _slope(self, theta: np.ndarray, filtered: dict, responses: dict, start: np.ndarray) -> np.ndarray:
+    def _slope(self, theta: np.ndarray, run: _Run) -> np.ndarray:
         """de/dtheta [p, B, T] at a fixed z, whose response rings through every F as the others do."""
-        slope = np.zeros((self.n_params, *start.shape))
-        length = start.shape[1]
+        slope = np.zeros((self.n_params, *run.e.shape))
+        length = run.e.shape[1]
         for j, _, f, part in self.split(theta):
-            twice = divide(responses[j] + start, f)
+            twice = divide(run.responses[j] + run.start, f)
             for k in range(1, self.nf[j] + 1):
                 slope[part.start + k - 1, :, k:] = twice[:, : length - k]
             for k in range(self.nb[j]):
                 lag = self.nk[j] + k
-                slope[part.start + self.nf[j] + k, :, lag:] = -filtered[j][:, : length - lag]
+                slope[part.start + self.nf[j] + k, :, lag:] = -run.filtered[j][:, : length - lag]
         if self.constant:
             slope[-1] = -1.0
         return slope
 
-    def _add_change_of_fit(self, slope: np.ndarray, theta: np.ndarray, free, inverse, misfit: np.ndarray) -> None:
-        """The part of dz/df that the misfit [B, n] of the first samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
-        n = misfit.shape[1]
-        spread = free @ (inverse @ inverse.T)  # [T, N]
+    def _add_change_of_fit(self, slope: np.ndarray, theta: np.ndarray, run: _Run) -> None:
+        """The part of dz/df that the misfit of the first n samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
+        n = run.inverse.shape[1]
+        misfit = run.e[:, :n]
+        spread = run.free @ (run.inverse @ run.inverse.T)  # [T, N]
         for j, _, f, part in self.split(theta):
-            change = divide(free[:n], f, axis=0)
+            change = divide(run.free[:n], f, axis=0)
             for k in range(1, self.nf[j] + 1):
                 slope[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A simulation of one group: u/F and B/F u of each input, R [T, N], the pseudo-inverse [N, n] of its first rows,
+    what the plant's past adds to the output, and e."""
+
+    filtered: dict[int, Float[np.ndarray, "_ _"]]
+    responses: dict[int, Float[np.ndarray, "_ _"]]
+    free: Float[np.ndarray, "_ _"]
+    inverse: Float[np.ndarray, "_ _"]
+    start: Float[np.ndarray, "_ _"]
+    e: Float[np.ndarray, "_ _"]
+
+    @property
+    def counted(self) -> Float[np.ndarray, "_ _"]:
+        """e without the samples that the start was found from, unless those are all."""
+        n = self.inverse.shape[1]
+        return self.e[:, n:] if n < self.e.shape[1] else self.e
 
 
 def _assemble(

@@ -110,13 +110,15 @@ class Polynomial:
     def _state_after(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
         """z [B, N, ny] at t = n, after the predictor has followed the n measured samples."""
         n, start = y.shape[1], self._start_state(u, y)
-        inputs, y_hat = np.concatenate((u, y), axis=2), self._follow(u, y, start)
+        signals = np.concatenate((u, y, self._follow(u, y, start)), axis=2)
+        weights = np.concatenate((self._predictor, -self.c), axis=2)
         state = np.zeros_like(start)
         for k in range(self.order):
             if n + k < self.order:
                 state[:, k] = start[:, n + k]
-            for m in range(k + 1, min(self.order, n + k) + 1):
-                state[:, k] += inputs[:, n + k - m] @ self._predictor[m].T - y_hat[:, n + k - m] @ self.c[m].T
+            oldest = min(self.order, n + k)  # of the lags, the last one that reaches into the record
+            past = signals[:, n + k - oldest :]
+            state[:, k] += np.tensordot(past, weights[oldest:k:-1], axes=((1, 2), (0, 2)))
         return state
 
 

@@ -38,7 +38,7 @@ def estimate_armax(
         check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
         equation = PredictionError.of(gram, orders, i, constant)
         begin = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
-        searches = [minimise(equation.cost, theta, equation.allowed, equation.samples) for theta in begin]
+        searches = [minimise(equation, theta) for theta in begin]
         best = min(searches, key=lambda search: search.cost.squares)
         names = coefficient_names(orders.lagged(i), *orders.nb.shape)
         names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
@@ -118,6 +118,10 @@ class PredictionError:
         batch, length = e.shape[0], e.shape[1] - self.nc
         lagged = [e[:, self.nc - k : self.nc - k + length] for k in range(1, self.nc + 1)]
         return np.array(lagged).reshape(self.nc, batch, length)
+
+    def squares(self, theta: np.ndarray) -> float:
+        """|e|^2."""
+        return sum(float(np.vdot(e, e)) for e in self.errors(theta))
 
     def cost(self, theta: np.ndarray) -> Cost:
         """|e|^2, half its gradient and J' J."""

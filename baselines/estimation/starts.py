@@ -64,7 +64,9 @@ def oe_starts(
         model = estimate_arx(lagged_gram(own, shift[kept], length), long).polynomial
         if np.abs(model.poles).max() < 1:
             smooth = [
-                Experiment(e.name, e.u[length:], model.simulate(e.u[None], e.y[None, :length])[0], e.dt) for e in own
+                Experiment("", *simulated, own[0].dt)
+                for u, y in stack(own)
+                for simulated in zip(u[:, length:], model.simulate(u, y[:, :length]), strict=True)
             ]
             yield from _prefiltered(smooth, shift[kept], equation)
 
@@ -75,7 +77,7 @@ def _prefiltered(experiments: Sequence[Experiment], shift: np.ndarray, equation:
     arx = Orders.of(1, len(equation.nb), na=nf, nb=[list(equation.nb)], nk=[list(equation.nk)])
     f = np.ones(1)
     for _ in range(8):
-        filtered = [_divided(experiment, shift, f) for experiment in experiments]
+        filtered = _divided(experiments, shift, f)
         model = estimate_arx(lagged_gram(filtered, np.zeros(len(shift)), arx.max_lag), arx).polynomial
         f = stable(model.a[: nf + 1, 0, 0], radius=1 - 1e-3)[0]
         slowest_first = sorted(np.roots(f), key=abs, reverse=True)
@@ -86,7 +88,10 @@ def _prefiltered(experiments: Sequence[Experiment], shift: np.ndarray, equation:
         yield np.concatenate([*theta, np.zeros(int(equation.constant))])
 
 
-def _divided(experiment: Experiment, shift: np.ndarray, f: np.ndarray) -> Experiment:
-    """The experiment with every signal filtered by 1/F."""
-    y, u = (divide(signal, f, axis=0) for signal in (experiment.y - shift[0], experiment.u - shift[1:]))
-    return Experiment(experiment.name, u, y, experiment.dt)
+def _divided(experiments: Sequence[Experiment], shift: np.ndarray, f: np.ndarray) -> list[Experiment]:
+    """The experiments with every signal filtered by 1/F."""
+    return [
+        Experiment("", *filtered, experiments[0].dt)
+        for u, y in stack(experiments)
+        for filtered in zip(divide(u - shift[1:], f, axis=1), divide(y - shift[0], f, axis=1), strict=True)
+    ]
