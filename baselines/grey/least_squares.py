@@ -151,13 +151,11 @@ class Problem:
         of_local = np.zeros((structure.n_local, len(here), m))
         for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
             of_local[i] = slope(moved, step)
-        if structure.local:
-            states = self.simulator.states(theta[None], local[None, :, : structure.order])[0]
-            for i, term in enumerate(structure.local, start=structure.order):
-                step = self._spread[term.channel] / self.records.duration
-                moved = local.copy()
-                moved[:, i] += step
-                of_local[i] = slope(self.simulator.outputs(theta, moved, states), step)
+        for i, term in enumerate(structure.local, start=structure.order):
+            step = self._spread[term.channel] / self.records.duration
+            moved = local.copy()
+            moved[:, i] += step
+            of_local[i] = slope(self.simulator.run(theta, moved), step)
         return Slopes(of_theta, of_local)
 
     def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:

@@ -176,6 +176,14 @@ class Structure:
         """Which of theta are estimated."""
         return np.array([not parameter.fixed for parameter in self.parameters], dtype=bool)
 
+    @cached_property
+    def acting(self) -> Bool[np.ndarray, " p"]:
+        """Which of theta the states depend on: not what only the readings do."""
+        acting = np.ones(self.size, dtype=bool)
+        for part in (*self.at[3:5], *(self.term_at(term) for term in self.terms if term.effect.port == "output")):
+            acting[part] = False
+        return acting
+
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """A of z' = A z + (inputs and forces)."""
         shape, n = theta[self.at[0]], self.order

@@ -24,7 +24,7 @@ from simgap.workers import Limits, prepare_worker
 
 # Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
 # changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
-PRELOADED = ("simgap.jobs", "numba", "scipy.signal", "scipy.optimize", "scipy.stats")
+PRELOADED = ("simgap.jobs", "simgap.engines.preloading", "scipy.signal", "scipy.optimize", "scipy.stats")
 PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
 
 # Seconds between two looks of the pool at its processes, of which every job needs a new one.

@@ -1,0 +1,8 @@
+"""Imported by the process from which those of the jobs are forked, so that numba is set up once for all of them."""
+
+from __future__ import annotations
+
+from numba import njit
+
+# The first thing that a process compiles, or reads from the cache, takes 0.3 s more than the second.
+njit("float64(float64)")(lambda x: x)
