@@ -91,8 +91,8 @@ def _left_over(gram: Gram, columns: _Columns, theta: np.ndarray) -> tuple[np.nda
     np.add.at(filters, (columns.signal, columns.lag), np.append(-coefficients, 1.0))
     products, squares = np.zeros(gram.sums.shape), 0.0
     for signals in gram.chunks():
-        taken = (np.convolve(signal, taps, "valid") for signal, taps in zip(signals, filters, strict=True))
-        residual = sum(taken) - constant
+        taken = [np.convolve(signal, taps, "valid") for signal, taps in zip(signals, filters, strict=True)]
+        residual = np.sum(taken, axis=0) - constant
         products += [np.correlate(signal, residual, "valid")[::-1] for signal in signals]
         squares += float(residual @ residual)
     gradient = products[columns.signal[:-1], columns.lag[:-1]]

@@ -30,15 +30,19 @@ class Equation(Protocol):
     @property
     def samples(self) -> int:
         """How many errors count."""
+        ...
 
     def squares(self, theta: Float[np.ndarray, " p"]) -> float:
         """|e|^2, which takes a fraction of the time of the slopes."""
+        ...
 
     def cost(self, theta: Float[np.ndarray, " p"]) -> Cost:
         """|e|^2, half its gradient and J' J."""
+        ...
 
     def allowed(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
         """The stable points that may stand for a trial point."""
+        ...
 
 
 def sum_up(linearised: Iterable[tuple[np.ndarray, np.ndarray]]) -> Cost:

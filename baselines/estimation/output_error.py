@@ -220,18 +220,17 @@ class OutputError:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A simulation of one group: u/F and B/F u of each input, R [T, N], the pseudo-inverse [N, n] of its first rows,
-    what the plant's past adds to the output, and e."""
+    """The simulation of one group, and what its slopes need of it."""
 
-    filtered: dict[int, Float[np.ndarray, "_ _"]]
-    responses: dict[int, Float[np.ndarray, "_ _"]]
-    free: Float[np.ndarray, "_ _"]
-    inverse: Float[np.ndarray, "_ _"]
-    start: Float[np.ndarray, "_ _"]
-    e: Float[np.ndarray, "_ _"]
+    filtered: dict[int, Float[np.ndarray, "B T"]]  # u/F of each input
+    responses: dict[int, Float[np.ndarray, "B T"]]  # B/F u
+    free: Float[np.ndarray, "T N"]  # R
+    inverse: Float[np.ndarray, "N n"]  # the pseudo-inverse of the first rows of R
+    start: Float[np.ndarray, "B T"]  # what the plant's past adds to the output
+    e: Float[np.ndarray, "B T"]
 
     @property
-    def counted(self) -> Float[np.ndarray, "_ _"]:
+    def counted(self) -> Float[np.ndarray, "B _"]:
         """e without the samples that the start was found from, unless those are all."""
         n = self.inverse.shape[1]
         return self.e[:, n:] if n < self.e.shape[1] else self.e

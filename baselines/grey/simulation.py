@@ -140,7 +140,7 @@ class Simulator:
     def run_many(
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
     ) -> Float[np.ndarray, "S E T ny"]:
-        """The same for several parameter vectors; a sensor's parameters, and the last first vector, cost no new loop."""
+        """The same for several parameter vectors; those that differ in what only sensors do share their states."""
         starts = locals_[:, :, : self.structure.order]
         keys = [t[self.structure.acting].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
         new = {key: i for i, key in enumerate(keys) if key not in self._known}
