@@ -14,6 +14,7 @@ from simgap.baselines.grey.noise import Noise
 from simgap.baselines.grey.outliers import Outliers, flag, left_out
 from simgap.baselines.grey.search import Search
 from simgap.baselines.grey.simulation import Simulator
+from simgap.baselines.grey.starting import starts
 from simgap.baselines.grey.structure import LOCAL_POWERS, Structure
 from simgap.records import Channels, Experiment
 
@@ -64,27 +65,15 @@ class Machine:
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Rows n .. T-1, from the start that suits the n measured samples best."""
         structure, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
-        start = self.start(structure, u[:, :n], y_init)
+        start = starts(structure, theta, u[:, :n], y_init, self.noise)
         return Simulator(structure, u).run(theta, start)[:, n:]
-
-    def start(self, structure: Structure, u: np.ndarray, y: np.ndarray) -> Float[np.ndarray, "B q"]:
-        """Local numbers at the first of the measured samples, by least squares on all of them."""
-        fixed = np.ones(len(self.estimate.theta), dtype=bool)
-
-        def of_one(i: int) -> np.ndarray:  # alone, because the damping of a fit is common to its records
-            seen = np.ones((1, y.shape[1]), dtype=bool)
-            records = Records(np.ascontiguousarray(u[i : i + 1]), y[i : i + 1], seen, structure.dt)
-            problem = Problem(structure, records, self.noise)
-            return problem.fit(self.estimate.theta, fixed=fixed, max_steps=15).local
-
-        return np.concatenate([of_one(i) for i in range(len(u))])
 
     def shares(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B T e"]:
         """What each effect does to the first output: the simulation less the one without it, from the same start."""
         structure, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         if not structure.terms:
             return np.zeros((*u.shape[:2], 0))
-        start = self.start(structure, u[:, :n], y_init)
+        start = starts(structure, theta, u[:, :n], y_init, self.noise)
         whole = Simulator(structure, u).run(theta, start)
         shares = []
         for term in structure.terms:
