@@ -25,8 +25,9 @@ def test_the_gradient_is_the_slope_of_the_cost():
     equation = PredictionError.of(lagged_gram(experiments, np.zeros(3), 2), orders, 0, True)
     theta = np.array([-0.5, 0.2, 1.0, 0.5, 0.3, -1.0, 0.2, 0.6, 0.3])
     steps = 1e-6 * np.eye(len(theta))
-    slope = [(equation.cost(theta + d).squares - equation.cost(theta - d).squares) / 4e-6 for d in steps]
+    slope = [(equation.squares(theta + d) - equation.squares(theta - d)) / 4e-6 for d in steps]
     np.testing.assert_allclose(equation.cost(theta).gradient, slope, rtol=1e-6)
+    np.testing.assert_allclose(equation.cost(theta).squares, equation.squares(theta), rtol=1e-12)
 
 
 def test_without_noise_polynomial_it_is_arx():

@@ -63,8 +63,9 @@ def test_the_gradient_is_the_slope_of_the_cost(seed, n_start):
     equation = OutputError.of(experiments, np.zeros(3), orders, 0, True, n_start)
     theta = np.array([-0.5, 0.2, 1.0, 0.5, 0.3, -1.0, 0.2, 0.1])
     steps = 1e-6 * np.eye(len(theta))
-    slope = [(equation.cost(theta + d).squares - equation.cost(theta - d).squares) / 4e-6 for d in steps]
+    slope = [(equation.squares(theta + d) - equation.squares(theta - d)) / 4e-6 for d in steps]
     np.testing.assert_allclose(equation.cost(theta).gradient, slope, rtol=1e-5, atol=1e-4)
+    np.testing.assert_allclose(equation.cost(theta).squares, equation.squares(theta), rtol=1e-12)
 
 
 def test_each_input_has_its_own_denominator():
