@@ -119,5 +119,4 @@ def test_an_epoch_next_to_keras(name, keras, note, row):
     note(f"{name}: validation loss after {EPOCHS} epochs {mine_loss:.5f}, Keras {other_loss:.5f}; "
          f"ratios of the seeds {np.round(np.exp(worse), 3)}.")  # fmt: skip
     assert ratio >= 3, f"{name}: {ratio:.1f} times Keras"
-    # Rounding over 2265 steps, and the second bias of our LSTM, move the loss of a seed either way.
-    assert worse.mean() < 0.05
+    assert abs(worse).max() < 0.05  # rounding in single precision, over 2265 steps
