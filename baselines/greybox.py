@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.grey.machine import Machine, groups
-from simgap.baselines.grey.search import Search
-from simgap.baselines.grey.structure import Term
+from simgap.greybox.model import Machine, groups
+from simgap.greybox.plant import Term
+from simgap.greybox.selection import Search
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from simgap.baselines.grey.machine import Machine, groups
-from simgap.baselines.grey.part import Part
-from simgap.baselines.grey.search import Search
 from simgap.baselines.greybox import GreyBox
+from simgap.greybox.evidence import Part
+from simgap.greybox.model import Machine, groups
+from simgap.greybox.selection import Search
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
 

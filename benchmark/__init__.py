@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 import importlib
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simgap.data import Missing, describe, fetch, load, save
     from simgap.diagnosis.diagnose import diagnose
-    from simgap.fitting import Fit, fit, load_model
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
-    from simgap.regression import Regression, check
     from simgap.reports.leaderboard import report
-    from simgap.runner import Progress, run
-    from simgap.suites import Suite, load_suite
-
-__version__ = "0.1.0"
+    from simgap.results.regression import Regression, check
+    from simgap.running.fitting import Fit, fit, load_model
+    from simgap.running.runner import Progress, run
+    from simgap.running.suites import Suite, load_suite
 
 _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
     "simgap.diagnosis.diagnose": ("diagnose",),
-    "simgap.fitting": ("Fit", "fit", "load_model"),
+    "simgap.running.fitting": ("Fit", "fit", "load_model"),
     "simgap.protocol": ("Model",),
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
     ),
-    "simgap.regression": ("Regression", "check"),
+    "simgap.results.regression": ("Regression", "check"),
     "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
     "simgap.reports.leaderboard": ("report",),
-    "simgap.runner": ("Progress", "run"),
-    "simgap.suites": ("Suite", "load_suite"),
+    "simgap.running.runner": ("Progress", "run"),
+    "simgap.running.suites": ("Suite", "load_suite"),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
@@ -44,6 +43,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a part on its first use, so that `import simgap` stays fast."""
+    if name == "__version__":
+        return version("simgap")
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'simgap' has no attribute {name!r}")
     value = getattr(importlib.import_module(_MODULE_OF[name]), name)

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from simgap.fitting import CheckedSimulation, ModelFault, check_params, load_model, model_class, reason
 from simgap.protocol import Model
 from simgap.records import Experiment, TrainingSet, UnusableInput
-from simgap.store import plain
+from simgap.results.store import plain
+from simgap.running.fitting import CheckedSimulation, ModelFault, check_params, load_model, model_class, reason
 
 N_INIT = 10
 # Share of the mean square error of `hold` that a model of a linear toy plant may have.

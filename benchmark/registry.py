@@ -158,8 +158,10 @@ def _registered(path: Path, constant: str) -> Iterator[tuple[str, str]]:
 
 
 MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")
-EFFECTS = Registry("effect", ("simgap.effects",), "EFFECTS")
-DATASETS = Registry("dataset", ("simgap.data",), "DATASETS")
+EFFECTS = Registry("effect", ("simgap.greybox.effects",), "EFFECTS")
+DATASETS = Registry(
+    "dataset", ("simgap.data.measured", "simgap.data.simulated", "simgap.data.simulated.gimbal"), "DATASETS"
+)
 
 
 def load_class(reference: str) -> type:

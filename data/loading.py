@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from simgap.data.description import check_columns
-from simgap.data.folder import experiment_of, load_folder
-from simgap.data.sampling import check_time, sampling_time
+from simgap.data.formats.description import check_columns
+from simgap.data.formats.folder import experiment_of, load_folder
+from simgap.data.formats.sampling import check_time, sampling_time
+from simgap.data.formats.tables import Table, read_csv
 from simgap.data.splits import assemble, split_in_time
-from simgap.data.tables import Table, read_csv
 from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
 from simgap.registry import DATASETS
 
@@ -36,7 +36,7 @@ def load(
         _refuse_columns(declared, f"data set {source}")
         return DATASETS[source]()
     if not isinstance(source, str | os.PathLike):
-        from simgap.data.frames import table_of  # pandas is slow to import
+        from simgap.data.formats.frames import table_of  # pandas is slow to import
 
         return _dataset_of(table_of(source), inputs, outputs, dt, name or "DataFrame")
     path = Path(source)

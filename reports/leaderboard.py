@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from simgap import store
 from simgap.records import Result, UnusableInput
-from simgap.reports.claims import claims, claims_table
 from simgap.reports.modes import modes_table
-from simgap.reports.paper import of_paper, paper_tables
+from simgap.reports.paper.claims import claims, claims_table
+from simgap.reports.paper.tables import of_paper, paper_tables
 from simgap.reports.published import published_markdown
 from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
+from simgap.results import store
 
 FEW = 2  # data sets, whose figures are shown after a run
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from simgap.metrics import pool, relative
 from simgap.records import Result
-from simgap.store import plain
+from simgap.results.store import plain
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from simgap.regression import Comparison, Regression
 from simgap.reports.rendering import to_markdown
 from simgap.reports.tables import Cell, Table
+from simgap.results.regression import Comparison, Regression
 
 HEADINGS = ["model", "data set", "figure", "seed", "before", "after", "limit", "verdict"]
 # Rows of what went wrong; the rest is counted.

@@ -11,7 +11,7 @@ import pandas as pd
 
 from simgap.records import Result
 from simgap.reports.pooling import Spread, Standing, standings
-from simgap.store import plain
+from simgap.results.store import plain
 
 # More test experiments than these are pooled into one column.
 COLUMNS_PER_EXPERIMENT = 4

@@ -4,25 +4,20 @@ import os
 from pathlib import Path
 
 import pytest
+from floor_plan import ROOT, modules
 from jaxtyping import install_import_hook
 
-ROOT = Path(__file__).parents[1]
-FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
-           "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
 # Called a hundred thousand times by one search; checks would make them five times as slow.
-INSIDE_A_FIT = ("grey.least_squares", "grey.simulation", "grey.structure")
+INSIDE_A_FIT = ("greybox.fitting", "greybox.simulation", "greybox.plant")
 
 
 def _modules() -> list[str]:
     """Every module but the command line, numba kernels (a checked function cannot be compiled) and a fit's inside."""
-    names = []
-    for folder, package in FOLDERS.items():
-        for path in (ROOT / folder).rglob("*.py"):
-            parts = path.relative_to(ROOT / folder).with_suffix("").parts
-            inside = path.stem.endswith("kernels") or ".".join(parts) in INSIDE_A_FIT
-            if not inside and "cli" not in parts and path.stem != "__init__":
-                names.append(".".join((package, *parts)))
-    return names
+    inside = {f"simgap.{name}" for name in INSIDE_A_FIT}
+    return [
+        name for name, path in modules().items()
+        if not (path.stem.endswith("kernels") or path.stem == "__init__" or name in inside or ".cli." in name)
+    ]  # fmt: skip
 
 
 install_import_hook(_modules(), "beartype.beartype")

@@ -12,24 +12,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from floor_plan import FOLDERS, ROOT
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-TREE = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural", "data": "simgap.data",
-        "reports": "simgap.reports"}  # fmt: skip
+
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
 
 
 def package_of(folder: Path) -> str:
     """baselines/estimation -> simgap.baselines.estimation"""
     top, *below = folder.relative_to(ROOT).parts
-    return ".".join((TREE[top], *below))
+    return ".".join((FOLDERS[top], *below))
 
 
 def files(*patterns: str) -> set[Path]:
-    found = {path for folder in TREE for pattern in patterns for path in (ROOT / folder).rglob(pattern)}
+    found = {path for folder in FOLDERS for pattern in patterns for path in (ROOT / folder).rglob(pattern)}
     return {path for path in found if path.is_file() and "__pycache__" not in path.parts}
 
 
@@ -74,7 +73,7 @@ def test_the_lock_file_has_what_the_project_asks_for():
 def wheels(tmp_path_factory) -> dict[str, Path]:
     """Ours, and that of a stranger whose top-level package is called baselines."""
     folder = tmp_path_factory.mktemp("wheels")
-    for name in TREE:  # a copy, because setuptools leaves files where it builds
+    for name in FOLDERS:  # a copy, because setuptools leaves files where it builds
         shutil.copytree(ROOT / name, folder / "simgap" / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, folder / "simgap")

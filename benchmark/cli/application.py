@@ -9,19 +9,20 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import authoring, catalogue, checking, data, diagnosing, fitting, ranging, reporting, running
+from simgap.cli import check, data, diagnose, fit, new_model, range_test, report, run, try_model
+from simgap.cli import list as catalogue
 from simgap.records import UnusableInput
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command("run")(running.run)
-app.command("report")(reporting.report)
+app.command("run")(run.run)
+app.command("report")(report.report)
 app.command("list")(catalogue.show)
-app.command("diagnose")(diagnosing.diagnose)
-app.command("fit")(fitting.fit)
-app.command("range-test")(ranging.range_test)
-app.command("check")(checking.check)
-app.command("new-model")(authoring.new_model)
-app.command("try-model")(authoring.try_model)
+app.command("diagnose")(diagnose.diagnose)
+app.command("fit")(fit.fit)
+app.command("range-test")(range_test.range_test)
+app.command("check")(check.check)
+app.command("new-model")(new_model.new_model)
+app.command("try-model")(try_model.try_model)
 app.add_typer(data.app, name="data")
 
 

@@ -35,12 +35,12 @@ class Diagnosis:
 
     def to_html(self) -> str:
         """One page that needs nothing else."""
-        from simgap.reports.diagnosis_page import diagnosis_page
+        from simgap.reports.diagnosis.page import diagnosis_page
 
         return diagnosis_page(self.findings)
 
     def __str__(self) -> str:
-        from simgap.reports.diagnosis_text import diagnosis_text
+        from simgap.reports.diagnosis.text import diagnosis_text
 
         return diagnosis_text(self.findings)
 

@@ -11,7 +11,7 @@ import numpy as np
 from simgap.diagnosis import checks, gains
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.causes import causes_of, runner_up
-from simgap.diagnosis.views import views
+from simgap.error_views.views import views
 from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.metrics import relative
 from simgap.records import Dataset

@@ -79,6 +79,6 @@ def refused_cell(tmp_path: Path, refused):
 def no_files(tmp_path: Path, monkeypatch) -> Path:
     """An empty cache, and nothing at hand anywhere else."""
     cache = tmp_path / "cache"
-    monkeypatch.setattr("simgap.data.locations.roots", lambda: [cache])
-    monkeypatch.setattr("simgap.data.fetching.cache", lambda: cache)
+    monkeypatch.setattr("simgap.data.measured.locations.roots", lambda: [cache])
+    monkeypatch.setattr("simgap.data.measured.fetching.cache", lambda: cache)
     return cache

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from simgap.data.gimbal import Gimbal, gimbal, gimbal_dataset
+from simgap.data.simulated.gimbal.recordings import Gimbal, gimbal, gimbal_dataset
 from simgap.registry import DATASETS
 
 

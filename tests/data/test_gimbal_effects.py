@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simgap.data.gimbal import Gimbal, simulate_gimbal
-from simgap.data.gimbal_inputs import INPUTS
+from simgap.data.simulated.gimbal.inputs import INPUTS
+from simgap.data.simulated.gimbal.recordings import Gimbal, simulate_gimbal
 
 CLEAN = Gimbal.linear(noise=(0.0, 0.0))
 

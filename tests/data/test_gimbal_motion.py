@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from simgap.data.gimbal import Gimbal, simulate_gimbal
-from simgap.data.gimbal_inputs import INPUTS
+from simgap.data.simulated.gimbal.inputs import INPUTS
+from simgap.data.simulated.gimbal.recordings import Gimbal, simulate_gimbal
 
 QUIET = {"noise": (0.0, 0.0), "drift": (0.0, 0.0), "quantisation": (0.0, 0.0)}
 SMOOTH = Gimbal.linear(

@@ -218,12 +218,12 @@ def test_a_set_with_only_some_of_its_files_is_missing(made):
 
 
 def test_files_are_found_in_the_folder_of_the_collection_itself_too(made, monkeypatch):
-    monkeypatch.setattr("simgap.data.locations.roots", lambda: [made])
+    monkeypatch.setattr("simgap.data.measured.locations.roots", lambda: [made])
     assert load("emps").name == "emps"
 
 
 def test_the_folder_of_the_environment_is_searched_first_and_the_cache_last(tmp_path, monkeypatch):
-    from simgap.data.locations import cache, roots
+    from simgap.data.measured.locations import cache, roots
 
     (tmp_path / "shared" / "data").mkdir(parents=True)
     (tmp_path / "checkout").mkdir()

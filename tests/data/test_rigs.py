@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from simgap.data.rigs import CATALOGUE, OUTSIDE, RIGS, hide, physical, suitable
+from simgap.data.simulated.rigs import CATALOGUE, OUTSIDE, RIGS, hide, physical, suitable
 
 EVERY = [(rig, effect) for rig in RIGS for effect in (*suitable(rig), *suitable(rig, outside=True))]
 

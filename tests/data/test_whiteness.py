@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from simgap.data.gimbal_inputs import INPUTS
+from simgap.data.simulated.gimbal.inputs import INPUTS
 from simgap.data.whiteness import whiteness
 from simgap.records import UnusableInput
 

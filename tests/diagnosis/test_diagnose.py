@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import simgap
-from simgap.data.gimbal import Gimbal, gimbal_dataset
-from simgap.data.rigs import hide, suitable
+from simgap.data.simulated.gimbal.recordings import Gimbal, gimbal_dataset
+from simgap.data.simulated.rigs import hide, suitable
 from simgap.diagnosis.diagnose import diagnose
-from simgap.diagnosis.hide_and_seek import Case, seek
+from simgap.diagnosis.recovery import Case, seek
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 # Twins of the design: what the data may not separate must at least be named as confounded.

@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 import simgap
-from simgap import store
 from simgap.cli.options import parse_params
 from simgap.data import load, save
-from simgap.diagnosis.hide_and_seek import read as read_outcomes
+from simgap.diagnosis.recovery import read as read_outcomes
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet, UnusableInput
-from simgap.regression import check
 from simgap.reports.leaderboard import report
 from simgap.reports.regressions import to_text
-from simgap.suites import load_suite
+from simgap.results import store
+from simgap.results.regression import check
+from simgap.running.suites import load_suite
 
 LIVE = ("<script", "<img", "<iframe", "javascript:")
 

@@ -1,7 +1,7 @@
 """Results of the suite `paper` made from figures: those that the paper prints, and any that a test changes."""
 
 from simgap.records import Result
-from simgap.reports.paper import LABELS, NAMES, PRINTED
+from simgap.reports.paper.tables import LABELS, NAMES, PRINTED
 
 UNITS = {"phi": "deg", "phi_dot": "deg/s"}
 TASKS = {"differences": "delta", "free_run": "contiguous"}

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from simgap.reports.claim_rules import RULES
-from simgap.reports.claims import claims, claims_table
+from simgap.reports.paper.claim_rules import RULES
+from simgap.reports.paper.claims import claims, claims_table
 from simgap.reports.rendering import to_markdown
 
 EXAMPLE = runpy.run_path(str(Path(__file__).with_name("example_paper.py")))

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from simgap import store
 from simgap.data import available, load
 from simgap.registry import DATASETS
 from simgap.reports.leaderboard import report
-from simgap.suites import load_suite, suite_names
+from simgap.results import store
+from simgap.running.suites import load_suite, suite_names
 
 RESULTS = Path(__file__).parents[2] / "reports" / "results"
 FILES = sorted(RESULTS.glob("*/*.jsonl"))

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from simgap.findings import Gain, Trace
-from simgap.reports.diagnosis_figures import label
-from simgap.reports.diagnosis_page import diagnosis_page
-from simgap.reports.diagnosis_traces import chosen, shown_range, thinned
+from simgap.reports.diagnosis.figures import label
+from simgap.reports.diagnosis.page import diagnosis_page
+from simgap.reports.diagnosis.traces import chosen, shown_range, thinned
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
 named, nothing_found, unexplained, hostile = (
@@ -183,5 +183,5 @@ def test_the_experiments_shown_are_the_most_improved_a_middling_and_the_worst(na
 
 
 def test_plotting_libraries_are_loaded_only_for_a_page():
-    code = "import sys, simgap.reports.diagnosis_page; sys.exit(bool({'plotly', 'jinja2'} & set(sys.modules)))"
+    code = "import sys, simgap.reports.diagnosis.page; sys.exit(bool({'plotly', 'jinja2'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

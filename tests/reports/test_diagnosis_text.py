@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from simgap.findings import Value
-from simgap.reports.diagnosis_numbers import interval, number, numbers, percent
-from simgap.reports.diagnosis_text import diagnosis_text
+from simgap.reports.diagnosis.numbers import interval, number, numbers, percent
+from simgap.reports.diagnosis.text import diagnosis_text
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
 named, nothing_found, unexplained, hostile = (

@@ -2,9 +2,9 @@ import pandas as pd
 import pytest
 
 import simgap
-from simgap import store
 from simgap.records import UnusableInput
 from simgap.reports.published import published_tables
+from simgap.results import store
 
 
 def test_a_report_has_a_section_per_suite_and_one_for_what_others_published(results, tmp_path):

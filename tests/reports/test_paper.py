@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from simgap import store
 from simgap.reports.leaderboard import brief, report, tables_of
-from simgap.reports.paper import LABELS, NAMES, PRINTED, of_paper, paper_tables, pooled_mse, rises
+from simgap.reports.paper.tables import LABELS, NAMES, PRINTED, of_paper, paper_tables, pooled_mse, rises
 from simgap.reports.rendering import to_markdown, to_rich
-from simgap.suites import load_suite
+from simgap.results import store
+from simgap.running.suites import load_suite
 
 EXAMPLE = runpy.run_path(str(Path(__file__).with_name("example_paper.py")))
 PHI = "MSE of phi on contiguous set [deg²]"

@@ -1,0 +1,128 @@
+"""`simgap fit`: one model on one data set, here and now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, parse_params, write_json
+
+if TYPE_CHECKING:
+    import rich.console
+    import rich.table
+
+    from simgap.records import Result
+    from simgap.running.fitting import Fit
+
+# Longer lists, such as a loss per epoch, are for machines.
+MANY = 8
+
+
+def fit(
+    model: Annotated[str, typer.Argument(help="Name of a model, or path/to/file.py:Class.")],
+    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    dt: SamplingTime = None,
+    param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
+    save: Annotated[Path | None, typer.Option(help="Folder for the weights of a network.")] = None,
+    json: Json = None,
+) -> None:
+    """Fit one model and print what it chose and how well it simulates the test experiments."""
+    from rich.console import Console
+
+    from simgap.records import UnusableInput
+    from simgap.results import store
+    from simgap.running import fitting
+
+    params = parse_params(param or ())
+    if save is not None and not hasattr(fitting.model_class(model), "save"):
+        raise UnusableInput(f"--save: {model} is no network, and only networks have weights to save")
+    console = Console()
+    try:
+        with _progress(console):
+            done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
+    except (UnusableInput, KeyboardInterrupt, OSError):
+        raise
+    except Exception as error:  # the model's own fault, told without our traceback
+        typer.echo(f"simgap: {fitting.reason('fit', error)}", err=True)
+        raise typer.Exit(1) from None
+    if json is not None:
+        write_json(json, store.encoded(done.results))
+    if save is not None:
+        done.model.save(save)
+    _print_model(console, done)
+    console.print(_scores(done.results))
+    if any(result.status == "error" for result in done.results):
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _progress(console: rich.console.Console) -> Iterator[None]:
+    """A bar with the time left for models that say how far they are, on a terminal."""
+    from rich.progress import Progress
+
+    from simgap.protocol import listen
+
+    if not console.is_terminal:
+        yield
+        return
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("fit", total=None)
+        listen(lambda done, total: bar.update(task, completed=done, total=total))
+        try:
+            yield
+        finally:
+            listen(None)
+
+
+def _told(value: object) -> str:
+    """What a fit chose, for people."""
+    if isinstance(value, dict):
+        return " ".join(f"{name} {_told(part)}" for name, part in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _print_model(console: rich.console.Console, done: Fit) -> None:
+    first = done.results[0]
+    size = "" if first.n_params is None else f", parameters: {first.n_params}"
+    lines = [f"{first.model} on {first.dataset}: fitted in {first.fit_seconds:.3g} s{size}"]
+    if first.fitted:
+        short = {
+            name: value for name, value in first.fitted.items() if not (isinstance(value, list) and len(value) > MANY)
+        }
+        lines.append("chosen: " + ", ".join(f"{name} = {_told(value)}" for name, value in short.items()))
+    summary = getattr(done.model, "summary", None)
+    if callable(summary):
+        lines.append(str(summary()))
+    lines += list(dict.fromkeys(f"note: {result.message}" for result in done.results if result.message))
+    for line in lines:
+        console.print(line, markup=False, highlight=False)
+
+
+def _scores(results: Sequence[Result]) -> rich.table.Table:
+    """The free-run scores per test experiment and output."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from simgap.reports.rendering import printable
+
+    table = Table("experiment", "output", title="Free-run simulation", title_justify="left", box=box.SIMPLE_HEAD)
+    for heading in ("RMSE", "fit %", "samples"):
+        table.add_column(heading, justify="right")
+    for result in results:
+        if result.task != "free_run":
+            continue
+        for output, figures in result.metrics.items():
+            texts = (
+                result.experiment, output, f"{figures['rmse']:.4g} {result.units.get(output, '')}".strip(),
+                f"{figures['fit_percent']:.1f}", str(figures["n_scored"]),
+            )  # fmt: skip
+            table.add_row(*(Text(printable(text)) for text in texts))
+    return table

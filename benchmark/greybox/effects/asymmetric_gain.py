@@ -1,0 +1,51 @@
+"""A gain that differs with the sign of the input."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("asymmetric_gain")
+@final
+class AsymmetricGain(InputEffect):
+    """u' = (1 + a) u for u > 0, (1 - a) u for u < 0."""
+
+    name: ClassVar[str] = "asymmetric_gain"
+    title: ClassVar[str] = "gain that differs with direction"
+    explanation: ClassVar[str] = (
+        "The machine answers more strongly one way than the other: unequal areas of a cylinder, unequal halves of "
+        "a power "
+        "stage, a single-acting brake."
+    )
+    reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
+    shows_in: ClassVar[tuple[str, ...]] = ("input", "sign of velocity")
+    twins: ClassVar[dict[str, str]] = {
+        "constant_load": "let it run without input: a load still moves it; and compare steps up and down of "
+        "several sizes: "
+        "an unequal gain errs in proportion to the step, a load by the same amount",
+        "quadratic_stiffness": "hold constant inputs of several sizes both ways: an unequal gain gives two "
+        "straight lines",
+        "sensor_bias": "record at rest without input: a bias is still there",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """Half the difference of the two gains over their mean."""
+        return (Parameter("asymmetry", "", -0.95, 0.95),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Either side stronger."""
+        return [Start((0.1,), amplitude=0)]
+
+    def suits(self, scene: Scene) -> bool:
+        """Only where the input takes both signs."""
+        return scene.u_low < 0 < scene.u_high
+
+    @staticmethod
+    def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
+        """Positive values grow by the share p[0], negative ones shrink by it."""
+        return u + p[0] * np.abs(u)

@@ -1,0 +1,53 @@
+"""Dry friction."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("coulomb_friction")
+@final
+class CoulombFriction(ForceEffect):
+    """f = -Fc sign(v); at standstill whatever holds it, up to Fc."""
+
+    name: ClassVar[str] = "coulomb_friction"
+    title: ClassVar[str] = "Coulomb friction"
+    explanation: ClassVar[str] = (
+        "Dry friction: a force of constant size against the motion, which also holds the machine where it stands "
+        "until the drive exceeds it."
+    )
+    reference: ClassVar[str] = (
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models ... for the control of machines with "
+        "friction, Automatica 30, 1994"
+    )
+    role: ClassVar[Role] = "friction"
+    shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "velocity", "time since reversal")
+    twins: ClassVar[dict[str, str]] = {
+        "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts "
+        "to move",
+        "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead "
+        "zone takes its share of the input only near zero",
+        "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
+        "quadratic_drag": "run at two constant speeds, one twice the other: dry friction costs the same at both",
+        "backlash": "stop and start again in the same direction: friction sticks, play is already taken up",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The friction force."""
+        return (Parameter("friction force", scene.force_unit, 0.0, 10 * scene.force),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """From little to what nearly holds the drive."""
+        return [Start((share * scene.force,)) for share in (0.05, 0.2, 0.5)]
+
+    def suits(self, scene: Scene) -> bool:
+        """Where something moves."""
+        return scene.kind in MOTION
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """The force that dry friction can hold."""
+        return p[i]

@@ -1,0 +1,42 @@
+"""A gain that fades in the course of an experiment."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("gain_fade")
+@final
+class GainFade(InputEffect):
+    """u' = (1 - r t) u, t since the start of the experiment."""
+
+    name: ClassVar[str] = "gain_fade"
+    title: ClassVar[str] = "gain that fades with time"
+    explanation: ClassVar[str] = (
+        "The same input does less and less in the course of each experiment: a sagging battery, a winding that "
+        "warms up, "
+        "oil that changes with temperature."
+    )
+    reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
+    shows_in: ClassVar[tuple[str, ...]] = ("first against second half", "time")
+    twins: ClassVar[dict[str, str]] = {
+        "sensor_drift": "record at rest without input: a drift is still there, a fading gain is not",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """Share of the gain that is lost per second; negative where it grows."""
+        return (Parameter("loss rate", "1/s", -2.0 / scene.duration, 1.0 / scene.duration),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Either way."""
+        return [Start((0.1 / scene.duration,), amplitude=0)]
+
+    @staticmethod
+    def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
+        """Times 1 - p[0] t at the middle of each step."""
+        return u * (1 - p[0] * h * (np.arange(u.shape[1]) + 0.5))

@@ -1,0 +1,48 @@
+"""Dead time of the input."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("input_delay")
+@final
+class InputDelay(InputEffect):
+    """u'(t) = u(t - tau)."""
+
+    name: ClassVar[str] = "input_delay"
+    title: ClassVar[str] = "delay of the input"
+    explanation: ClassVar[str] = (
+        "The input arrives unchanged but late: transport in a pipe or on a belt, a bus, a computation that takes a "
+        "cycle."
+    )
+    reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
+    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    twins: ClassVar[dict[str, str]] = {
+        "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; "
+        "a short "
+        "hold of the input excites the high frequencies that tell them apart",
+        "sensor_lag": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
+    }
+    substeps: ClassVar[int] = 4
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The delay."""
+        return (Parameter("delay", "s", 0.0, min(60 * scene.dt, 0.25 * scene.duration)),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """From half a sample to many."""
+        return [Start((n * scene.dt,)) for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scene.dt < 0.2 * scene.duration]
+
+    @staticmethod
+    def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
+        """The mean over each step of what left p[0] seconds before; before the record u stood at its first value."""
+        whole, part = divmod(max(p[0], 0.0) / h, 1.0)
+        steps = min(int(whole), u.shape[1] - 1)
+        padded = np.concatenate((np.repeat(u[:, :1], steps + 1, axis=1), u), axis=1)
+        return (1 - part) * padded[:, 1 : 1 + u.shape[1]] + part * padded[:, : u.shape[1]]

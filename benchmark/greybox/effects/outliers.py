@@ -1,0 +1,42 @@
+"""Single readings that are far off."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("outliers")
+@final
+class Outliers(OutputEffect):
+    """reading = y + a few single errors: e has the density (1 - r) N(0, s^2) + r N(0, S^2)."""
+
+    name: ClassVar[str] = "outliers"
+    title: ClassVar[str] = "outliers"
+    explanation: ClassVar[str] = (
+        "Single readings are far off and the next one is right again: a loose plug, a lost package, a reflection."
+    )
+    reference: ClassVar[str] = "Huber and Ronchetti, Robust Statistics, 2009, ch. 1"
+    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
+    twins: ClassVar[dict[str, str]] = {}
+    per_experiment: ClassVar[bool] = True
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """How many readings, and how far they are off; estimated from the errors, not by the simulation."""
+        return (
+            Parameter("share of readings", "", 0.0, 0.2, fixed=True),
+            Parameter("size", scene.y_unit, 0.0, 100 * scene.y_rms, fixed=True),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """None: what is an outlier shows in the errors of the rest."""
+        return []
+
+    @staticmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Nothing: which reading is off cannot be simulated."""
+        return y

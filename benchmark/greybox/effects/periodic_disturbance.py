@@ -1,0 +1,52 @@
+"""A sine force over time."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("periodic_disturbance")
+@final
+class PeriodicDisturbance(ForceEffect):
+    """f = A sin(2 pi f t + phase), t since the start of the experiment."""
+
+    name: ClassVar[str] = "periodic_disturbance"
+    title: ClassVar[str] = "periodic disturbance"
+    explanation: ClassVar[str] = (
+        "A force of one frequency that has nothing to do with the input: an unbalanced rotor nearby, mains hum, a "
+        "pump's pulsation."
+    )
+    reference: ClassVar[str] = (
+        "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"
+    )
+    role: ClassVar[Role] = "force"
+    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time")
+    twins: ClassVar[dict[str, str]] = {
+        "position_torque": "move at another speed: a disturbance in time keeps its frequency",
+        "sensor_drift": "record for longer: a drift does not come back",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """Amplitude, frequency, and phase at the start of an experiment."""
+        return (
+            Parameter("amplitude", scene.force_unit, -20 * scene.force, 20 * scene.force),
+            Parameter("frequency", "Hz", 0.2 / scene.duration, 0.5 / scene.dt),
+            Parameter("phase", "rad", -20.0, 20.0),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Lines of the error's spectrum that all experiments share, each with two phases."""
+        return [
+            Start((0.1 * scene.force, frequency, phase), amplitude=0)
+            for frequency in scene.frequencies
+            for phase in (0.0, 1.57)
+        ]
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """A sine over time."""
+        return p[i] * math.sin(6.283185307179586 * p[i + 1] * t + p[i + 2])

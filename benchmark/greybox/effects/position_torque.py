@@ -1,0 +1,59 @@
+"""A force that repeats over position."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("position_torque")
+@final
+class PositionTorque(ForceEffect):
+    """f = A sin(2 pi x / X + phase)."""
+
+    name: ClassVar[str] = "position_torque"
+    title: ClassVar[str] = "torque that depends on position"
+    explanation: ClassVar[str] = (
+        "A force that goes up and down over the travel, whatever the time: cogging of a motor's magnets, a cable "
+        "or hose that pulls, an eccentric mass."
+    )
+    reference: ClassVar[str] = (
+        "Proca et al., Analytical model for permanent magnet motors with surface mounted magnets, IEEE Trans. "
+        "Energy Conversion 18, 2003"
+    )
+    role: ClassVar[Role] = "force"
+    shows_in: ClassVar[tuple[str, ...]] = ("position",)
+    twins: ClassVar[dict[str, str]] = {
+        "cubic_stiffness": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
+        "periodic_disturbance": "move at another speed: a torque over position changes its frequency in time",
+        "constant_load": "hold it at several positions: a load is the same at all of them",
+        "quadratic_stiffness": "travel further: a torque that repeats over position turns back",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """Amplitude, length of one period, and phase at position zero."""
+        return (
+            Parameter("amplitude", scene.force_unit, -20 * scene.force, 20 * scene.force),
+            Parameter("period", scene.y_unit, 0.05 * scene.place, 2 * scene.place),
+            Parameter("phase", "rad", -20.0, 20.0),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Periods from a tenth of the travel to several times its length, each with two phases."""
+        return [
+            Start((0.1 * scene.force, length * scene.place, phase), amplitude=0)
+            for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.5)
+            for phase in (0.0, 1.57)
+        ]
+
+    def suits(self, scene: Scene) -> bool:
+        """Where a position is known."""
+        return scene.kind == "position" or (scene.kind == "other" and scene.order > 1)
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """A sine over position."""
+        return p[i] * math.sin(6.283185307179586 * x / p[i + 1] + p[i + 2])

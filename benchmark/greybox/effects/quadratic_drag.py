@@ -1,0 +1,55 @@
+"""Drag of a turbulent flow."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("quadratic_drag")
+@final
+class QuadraticDrag(ForceEffect):
+    """f = -c v abs(v)."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    title: ClassVar[str] = "quadratic drag"
+    explanation: ClassVar[str] = (
+        "A force against the motion that grows with the square of the velocity: air or water around the body, oil "
+        "through an orifice."
+    )
+    reference: ClassVar[str] = "Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, ch. 6"
+    role: ClassVar[Role] = "force"
+    shows_in: ClassVar[tuple[str, ...]] = ("velocity", "amplitude")
+    twins: ClassVar[dict[str, str]] = {
+        "coulomb_friction": "run at two constant speeds, one twice the other: drag costs four times as much",
+        "input_saturation": "hold constant inputs up to the largest: with drag the steady speed bends, with "
+        "saturation it stops growing at once",
+        "dead_zone": "hold several constant inputs: the steady output over the input is curved for drag, kinked "
+        "for a dead zone",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The drag coefficient."""
+        return (
+            Parameter(
+                "drag",
+                scene.unit(-1, 0 if scene.order > 1 or scene.kind == "velocity" else -1),
+                0.0,
+                100 * scene.force / scene.rate**2,
+            ),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """A small drag."""
+        return [Start((0.1 * scene.force / scene.rate**2,), amplitude=0)]
+
+    def suits(self, scene: Scene) -> bool:
+        """Where something moves."""
+        return scene.kind in MOTION
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """Against v, with its square."""
+        return -p[i] * v * abs(v)

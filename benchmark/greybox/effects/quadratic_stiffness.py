@@ -1,0 +1,52 @@
+"""A quadratic spring."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("quadratic_stiffness")
+@final
+class QuadraticStiffness(ForceEffect):
+    """f = -k x^2."""
+
+    name: ClassVar[str] = "quadratic_stiffness"
+    title: ClassVar[str] = "quadratic stiffness"
+    explanation: ClassVar[str] = (
+        "A spring that pulls harder on one side than on the other: a preloaded or one-sided suspension, a magnet's "
+        "pull."
+    )
+    reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
+    role: ClassVar[Role] = "force"
+    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    twins: ClassVar[dict[str, str]] = {
+        "constant_load": "hold it at several positions: a load is the same at all of them",
+        "asymmetric_gain": "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The coefficient."""
+        return (
+            Parameter(
+                "stiffness",
+                scene.unit(-1, -scene.order),
+                -100 * scene.force / scene.place**2,
+                100 * scene.force / scene.place**2,
+            ),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """A weak spring."""
+        return [Start((0.1 * scene.force / scene.place**2,), amplitude=0)]
+
+    def suits(self, scene: Scene) -> bool:
+        """Where a position is known."""
+        return scene.kind == "position" or (scene.kind == "other" and scene.order > 1)
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """The spring's pull."""
+        return -p[i] * x * x

@@ -1,0 +1,43 @@
+"""A biased sensor."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("sensor_bias")
+@final
+class SensorBias(OutputEffect):
+    """reading = y + b, with another b in every experiment."""
+
+    name: ClassVar[str] = "sensor_bias"
+    title: ClassVar[str] = "sensor bias"
+    explanation: ClassVar[str] = (
+        "The reading is off by a constant that differs from experiment to experiment: a zero that is not set, an "
+        "encoder switched on anywhere."
+    )
+    reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
+    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
+    twins: ClassVar[dict[str, str]] = {
+        "constant_load": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
+        "sensor_drift": "record for longer: a drift goes on growing",
+    }
+    per_experiment: ClassVar[bool] = True
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The bias."""
+        return (Parameter("bias", scene.y_unit, -10 * scene.y_rms, 10 * scene.y_rms),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Either way."""
+        return [Start((0.1 * scene.y_rms,), amplitude=0)]
+
+    @staticmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Plus p[0]."""
+        return y + p[0]

@@ -1,0 +1,51 @@
+"""A drifting sensor."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+
+from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("sensor_drift")
+@final
+class SensorDrift(OutputEffect):
+    """reading = y + r t, with another slope r in every experiment."""
+
+    name: ClassVar[str] = "sensor_drift"
+    title: ClassVar[str] = "sensor drift"
+    explanation: ClassVar[str] = (
+        "The reading wanders off steadily while the machine does not: an integrated gyro, a warming amplifier, a "
+        "creeping load cell."
+    )
+    reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
+    shows_in: ClassVar[tuple[str, ...]] = ("time", "first against second half")
+    twins: ClassVar[dict[str, str]] = {
+        "gain_fade": "record at rest without input: a drift is still there",
+        "constant_load": "record for longer: a drift goes on growing",
+        "sensor_bias": "record for longer: a bias stays as it is",
+    }
+    per_experiment: ClassVar[bool] = True
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The slope."""
+        return (
+            Parameter(
+                "slope",
+                scene.y_unit + "/s" if scene.y_unit else "1/s",
+                -10 * scene.y_rms / scene.duration,
+                10 * scene.y_rms / scene.duration,
+            ),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Either way."""
+        return [Start((0.1 * scene.y_rms / scene.duration,), amplitude=0)]
+
+    @staticmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Plus p[0] t."""
+        return y + p[0] * t

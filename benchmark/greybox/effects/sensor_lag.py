@@ -1,0 +1,49 @@
+"""A slow sensor."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+import numpy as np
+from scipy.signal import lfilter
+
+from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("sensor_lag")
+@final
+class SensorLag(OutputEffect):
+    """T dr/dt = y - r, r the reading."""
+
+    name: ClassVar[str] = "sensor_lag"
+    title: ClassVar[str] = "lag of the sensor"
+    explanation: ClassVar[str] = (
+        "The reading follows the quantity like a first-order filter: a thermometer in its sheath, a filtered signal."
+    )
+    reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
+    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    twins: ClassVar[dict[str, str]] = {
+        "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in "
+        "a machine that is otherwise linear: they are the same transfer function",
+        "input_delay": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """The time constant."""
+        return (Parameter("time constant", "s", 0.0, 0.25 * scene.duration),)
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """From a sample to a good part of the record."""
+        return [Start((n * scene.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scene.dt < 0.2 * scene.duration]
+
+    @staticmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """A first-order lag of p[0] seconds, exact for straight lines between samples; it starts settled."""
+        if len(t) < 2 or p[0] <= 1e-3 * (t[1] - t[0]):
+            return y
+        ratio = (t[1] - t[0]) / p[0]
+        decay = np.exp(-ratio)
+        now = 1 - (1 - decay) / ratio  # weight of the new sample; the old one has the rest
+        reading, _ = lfilter([now, 1 - decay - now], [1.0, -decay], y, axis=1, zi=(1 - now) * y[:, :1])
+        return reading

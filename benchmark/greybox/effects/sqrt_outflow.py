@@ -1,0 +1,50 @@
+"""Outflow by gravity."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, final
+
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("sqrt_outflow")
+@final
+class SqrtOutflow(ForceEffect):
+    """q = a ((1 - s) x + s sqrt(x X)), X the mid level: s = 1 is Torricelli's law."""
+
+    name: ClassVar[str] = "sqrt_outflow"
+    title: ClassVar[str] = "square-root outflow"
+    explanation: ClassVar[str] = (
+        "A tank empties through a hole with the square root of its level, not in proportion to it."
+    )
+    reference: ClassVar[str] = "Torricelli 1643; Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
+    role: ClassVar[Role] = "outflow"
+    reshapes: ClassVar[bool] = True
+    shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
+    twins: ClassVar[dict[str, str]] = {
+        "overflow": "fill it slowly past the largest level: only an overflow stops the rise",
+        "sensor_saturation": "empty it through a measured drain: a saturated reading stays while the level falls",
+    }
+
+    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+        """Share of the square root, and the level where both laws agree."""
+        middle = max(0.5 * (scene.y_low + scene.y_high), 0.05 * scene.y_high)
+        return (
+            Parameter("square-root share", "", 0.0, 1.0),
+            Parameter("mid level", scene.y_unit, middle, middle, fixed=True),
+        )
+
+    def starts(self, scene: Scene) -> list[Start]:
+        """Weak and strong."""
+        return [Start((share, max(0.5 * (scene.y_low + scene.y_high), 0.05 * scene.y_high))) for share in (0.4, 0.95)]
+
+    def suits(self, scene: Scene) -> bool:
+        """Where a level is measured."""
+        return scene.kind == "level" and scene.y_high > 0
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """What flows out at level x on top of x, in units of the linear rate."""
+        return p[i] * (math.sqrt(x * p[i + 1]) - x) if x > 0.0 else 0.0

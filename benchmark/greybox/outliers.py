@@ -1,0 +1,65 @@
+"""Single readings that are far off: found in the errors, left out of every fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy.lib.stride_tricks import sliding_window_view
+
+from simgap.greybox.fitting import Records
+
+FAR = 6.0  # robust standard deviations; Gaussian noise goes there twice in 1e9 readings
+FEWEST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Outliers:
+    """How many readings of which output are off, by how much, and what they make of the squared error."""
+
+    output: int
+    rate: float
+    size: float
+    share: float
+    log_likelihood_ratio: float
+
+
+def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
+    """Readings whose error stands out from the median of the five around it.
+
+    The errors of a model that is wrong are large for a while; those of a bad reading only once.
+    """
+    padded = np.pad(errors, ((0, 0), (2, 2), (0, 0)), mode="edge")
+    around = np.median(sliding_window_view(padded, 5, axis=1), axis=-1)
+    off = np.where(mask[:, :, None], errors - around, 0.0)
+    flags = np.zeros(errors.shape, dtype=bool)
+    for j in range(errors.shape[2]):
+        deviation = 1.4826 * np.median(np.abs(off[:, :, j][mask]))
+        if deviation > 0:
+            flags[:, :, j] = (np.abs(off[:, :, j]) > FAR * deviation) & mask
+    return flags
+
+
+def find(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
+    """The outputs with enough readings that are off: log-likelihood of errors of two sizes against one size."""
+    flags = flag(errors, mask)
+    found = []
+    for j in range(errors.shape[2]):
+        e, bad = errors[:, :, j][mask], flags[:, :, j][mask]
+        count, n = int(bad.sum()), len(e)
+        if count < FEWEST or count > 0.2 * n:
+            continue
+        one, good, far = np.std(e), np.std(e[~bad]), np.sqrt(np.mean(e[bad] ** 2))
+        rate = count / n
+        ratio = n * np.log(one) - (n - count) * np.log(good / (1 - rate)) - count * np.log(far / rate)
+        if ratio > 15:
+            share = 1 - float(np.sum(e[~bad] ** 2) / np.sum(e**2))
+            found.append(Outliers(j, rate, float(far), share, float(ratio)))
+    return found
+
+
+def left_out(records: Records, errors: Float[np.ndarray, "E T ny"], found: list[Outliers]) -> Records:
+    """The records without the readings that are off."""
+    flags = flag(errors, records.mask)[:, :, [o.output for o in found]].any(axis=2)
+    return replace(records, mask=records.mask & ~flags)

@@ -1,0 +1,80 @@
+"""Sizes of a machine's signals, from the data and a first linear model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.greybox.effects.effect import Scene
+from simgap.greybox.fitting import Estimate, Problem, Records
+from simgap.greybox.plant import Scenes
+from simgap.records import Channels
+
+LINES = 3
+# Two neighbouring readings are taken to lie on one grid when this share of all steps are whole multiples of it.
+ON_GRID = 0.999
+
+
+def scenes_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> Scenes:
+    """What the effects need to know to choose bounds and starts, for each input and each of the plant's outputs."""
+    structure, records = estimate.structure, problem.records
+    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, : structure.order])[0][
+        records.mask
+    ]  # [N, n]
+    drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
+    place = float(np.max(np.abs(states[:, -1 if structure.cascade else 0])))
+    rate = float(np.max(np.abs(states[:, min(1, structure.order - 1)])))
+
+    def scene(i: int, j: int) -> Scene:
+        u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
+        return Scene(
+            kind=structure.kind, order=structure.order, dt=structure.dt, duration=records.duration,
+            u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
+            y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
+            place=place or 1.0, rate=rate or 1.0, travel=_travel(structure.order, place, rate, records, states),
+            force=float(np.std(drive)) or 1.0, u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
+            frequencies=lines(estimate.errors[:, :, 0], records.dt), lattice=lattice(records.y[:, :, j]),
+        )  # fmt: skip
+
+    return Scenes(tuple(scene(i, 0) for i in range(structure.nu)), tuple(scene(0, j) for j in range(structure.ny)))
+
+
+def _travel(order: int, place: float, rate: float, records: Records, states: np.ndarray) -> float:
+    if order > 1:
+        return place or 1.0
+    # Where only a velocity is measured: its integral between two changes of sign, at most.
+    crossings = np.flatnonzero(np.diff(np.sign(states[:, 0])) != 0)
+    longest = np.max(np.diff(crossings), initial=10)
+    return (rate or 1.0) * records.dt * float(min(longest, 200)) * 0.5
+
+
+def lines(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:
+    """Frequencies in Hz at which the errors of all experiments agree in amplitude and phase."""
+    n = 1 << int(np.ceil(np.log2(4 * e.shape[1])))
+    power = np.abs(np.fft.rfft(e.sum(0), n)) ** 2
+    frequencies = np.fft.rfftfreq(n, dt)
+    power[frequencies < 0.7 / (dt * e.shape[1])] = 0.0
+    found: list[float] = []
+    for _ in range(LINES):
+        peak = int(np.argmax(power))
+        if power[peak] <= 0:
+            break
+        found.append(float(frequencies[peak]))
+        power[np.abs(frequencies - frequencies[peak]) < 1.0 / (dt * e.shape[1])] = 0.0
+    return tuple(found)
+
+
+def lattice(y: Float[np.ndarray, "E T"]) -> float:
+    """The step of the grid that all readings lie on; 0 when they do not, or when it is too fine to matter."""
+    values = np.unique(y)
+    if len(values) < 3:
+        return 0.0
+    steps = np.diff(values)
+    step = float(np.min(steps[steps > 1e-9 * np.ptp(values)], initial=np.inf))
+    if not np.isfinite(step) or step < 1e-3 * np.std(y):
+        return 0.0
+    whole = values / step
+    # A digital reading is a multiple of its step; rounding in a file leaves a little.
+    return step if np.mean(np.abs(whole - np.round(whole)) < 0.02) > ON_GRID else 0.0

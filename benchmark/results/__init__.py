@@ -1,0 +1,1 @@
+"""Results: the store of rows, and the comparison of two stores."""

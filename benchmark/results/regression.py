@@ -1,0 +1,231 @@
+"""Results against a reference, row by row: what became worse, and by how much it might have."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from simgap.records import Result, UnusableInput
+from simgap.registry import MODELS
+from simgap.results import store
+from simgap.running.suites import load_suite
+
+Verdict = Literal["same", "better", "worse", "missing", "new"]
+
+# Share by which an RMSE may grow (design, section 6): of a model that computes, and of one that is trained from random
+# weights, where three times the spread of its seeds counts if that is more.
+COMPUTED = 1e-6
+TRAINED = 0.05
+SIGMAS = 3.0
+# Share of the spread of what was measured below which an RMSE is rounding.
+ROUNDING = 1e-9
+ON_AVERAGE = "on average"
+
+Name = tuple[str, str, str]  # experiment, task, and output with its horizon
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One RMSE before and after, in the output's unit, and the limit above which it is worse.
+
+    The figure `on average` is the geometric mean over all RMSEs of a model on a data set, whose units do not matter as
+    it is only compared with itself. None: there is none.
+    """
+
+    suite: str
+    model: str
+    dataset: str
+    figure: str
+    seed: int | None
+    before: float | None
+    after: float | None
+    limit: float
+    verdict: Verdict
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Regression:
+    """All comparisons, and what a reader should know besides."""
+
+    comparisons: tuple[Comparison, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def wrong(self) -> list[Comparison]:
+        """What is worse or missing."""
+        return [one for one in self.comparisons if one.verdict in ("worse", "missing")]
+
+
+def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
+    """Compare the results in a folder with those of a reference, suite by suite.
+
+    An RMSE is worse when it exceeds the reference by more than 1e-6 of it or, for networks, by more than
+    max(3 sigma of the reference's seeds, 5 %); so is their geometric mean per model and data set. A row of the
+    reference is missing when the new results lack it although they have its seed. Raises UnusableInput.
+    """
+    new, reference = Path(new), Path(reference)
+    for folder in (new, reference):
+        if not folder.is_dir():
+            raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one with results")
+    suites = [path.name for path in sorted(new.iterdir()) if any(path.glob("*.jsonl"))]
+    known = [name for name in suites if any((reference / name).glob("*.jsonl"))]
+    if not known:
+        raise UnusableInput(f"{reference} holds no results of {', '.join(suites) or 'any suite'}; nothing to compare")
+    comparisons: list[Comparison] = []
+    notes = [f"suite {name} is not in the reference and was not compared" for name in suites if name not in known]
+    for suite in known:
+        before, after = store.read(reference / suite), store.read(new / suite)
+        comparisons += compare(suite, before, after)
+        notes += _other_data(before, after)
+    return Regression(tuple(comparisons), tuple(notes))
+
+
+def compare(suite: str, before: Sequence[Result], after: Sequence[Result]) -> list[Comparison]:
+    """All comparisons of a suite, model by model and data set by data set."""
+    trained = _trained(suite)
+    theirs, ours = _grouped(before), _grouped(after)
+    seeds = {row.seed for row in after}
+    found: list[Comparison] = []
+    for group, rows in theirs.items():
+        model, _, dataset = group
+        group_of = _Group(suite, model, dataset, rows, ours.get(group, []), model in trained)
+        found += group_of.row_by_row(seeds)
+        found += group_of.on_average()
+    for group in ours.keys() - theirs.keys():
+        found.append(Comparison(suite, group[0], group[2], ON_AVERAGE, None, None, None, math.inf, "new"))
+    return found
+
+
+@dataclass(frozen=True)
+class _Group:
+    """The rows of one model on one data set, before and after."""
+
+    suite: str
+    model: str
+    dataset: str
+    before: list[Result]
+    after: list[Result]
+    trained: bool
+
+    def row_by_row(self, seeds: set[int]) -> Iterator[Comparison]:
+        """Every figure of every row of the reference whose seed was run."""
+        after = {store.key(row): row for row in self.after}
+        for row in self.before:
+            if row.seed not in seeds:
+                continue
+            now = after.get(store.key(row))
+            if now is None:
+                yield self._comparison(f"{row.experiment}, {row.task}", row.seed, None, None, math.inf, "missing",
+                                       "no such row")  # fmt: skip
+                continue
+            figures = _figures(now)
+            for name, (value, scale) in _figures(row).items():
+                limit = value + self._allowed(value, self._spread.get(name, 0.0), scale)
+                figure = ", ".join(name)
+                if name not in figures:
+                    yield self._comparison(figure, row.seed, value, None, limit, "missing", now.message or now.status)
+                else:
+                    yield self._judged(figure, row.seed, value, figures[name][0], limit, now)
+
+    def on_average(self) -> Iterator[Comparison]:
+        """The geometric mean of all figures of both, which spreads less than each of them."""
+        before, after = _means(self.before), _means(self.after)
+        shared = sorted(before.keys() & after.keys())
+        if not shared or not self._spread:
+            return
+        was, is_now = (math.exp(statistics.fmean(of[seed] for seed in shared)) for of in (before, after))
+        sigma = statistics.stdev(before.values()) / math.sqrt(len(shared)) if len(before) > 1 else 0.0
+        limit = was * math.exp(max(SIGMAS * sigma, math.log1p(TRAINED)))
+        yield self._judged(ON_AVERAGE, None, was, is_now, limit, None)
+
+    def _allowed(self, value: float, sigma: float, scale: float) -> float:
+        if not math.isfinite(value):
+            return 0.0
+        if self.trained or sigma > COMPUTED * value:
+            return max(SIGMAS * sigma, TRAINED * value)
+        return COMPUTED * value + ROUNDING * scale
+
+    def _judged(
+        self, figure: str, seed: int | None, before: float, after: float, limit: float, row: Result | None
+    ) -> Comparison:
+        margin = limit - before if math.isfinite(before) else 0.0
+        verdict: Verdict = "worse" if after > limit else "better" if after < before - margin else "same"
+        why = row.message if row is not None and row.status != "ok" and verdict == "worse" else ""
+        return self._comparison(figure, seed, before, after, limit, verdict, why)
+
+    def _comparison(
+        self, figure: str, seed: int | None, before: float | None, after: float | None, limit: float,
+        verdict: Verdict, why: str = "",
+    ) -> Comparison:  # fmt: skip
+        return Comparison(self.suite, self.model, self.dataset, figure, seed, before, after, limit, verdict, why)
+
+    @cached_property
+    def _spread(self) -> dict[Name, float]:
+        """Standard deviation over the reference's seeds of each figure that has several and differs among them."""
+        values: dict[Name, list[float]] = {}
+        for row in self.before:
+            for name, (value, _) in _figures(row).items():
+                if math.isfinite(value):
+                    values.setdefault(name, []).append(value)
+        return {
+            name: statistics.stdev(many) for name, many in values.items()
+            if len(many) > 1 and max(many) > min(many)
+        }  # fmt: skip
+
+
+def _figures(row: Result) -> dict[Name, tuple[float, float]]:
+    """Every RMSE of a row with the spread of what was measured: of the whole record, and at each horizon."""
+    found: dict[Name, tuple[float, float]] = {}
+    for output, figures in row.metrics.items():
+        scale = float(figures.get("std", 0.0))
+        if "rmse" in figures:
+            found[row.experiment, row.task, output] = float(figures["rmse"]), scale
+        for horizon, value in figures.get("rmse_by_horizon", {}).items():
+            found[row.experiment, row.task, f"{output} {horizon} ahead"] = float(value), scale
+    return found
+
+
+def _means(rows: Sequence[Result]) -> dict[int, float]:
+    """Of each seed the mean logarithm of its RMSEs; a seed with one that has no logarithm is left to its rows."""
+    values: dict[int, list[float]] = {}
+    for row in rows:
+        values.setdefault(row.seed, []).extend(value for value, _ in _figures(row).values())
+    return {
+        seed: statistics.fmean(map(math.log, many)) for seed, many in values.items()
+        if many and all(0 < value < math.inf for value in many)
+    }  # fmt: skip
+
+
+def _grouped(rows: Sequence[Result]) -> dict[tuple[str, str, str], list[Result]]:
+    groups: dict[tuple[str, str, str], list[Result]] = {}
+    for row in rows:
+        model, params, dataset, *_ = store.key(row)
+        groups.setdefault((model, params, dataset), []).append(row)
+    return groups
+
+
+def _trained(suite: str) -> set[str]:
+    """The models of one of simgap's suites that start from random weights."""
+    try:
+        entries = load_suite(suite).models
+    except UnusableInput:  # a suite of somebody's own: then only its seeds can tell
+        return set()
+    return {
+        entry.label for entry in entries
+        if any(MODELS.module(str(name)).startswith("simgap.neural.") for name in (entry.name, *entry.params.values()))
+    }  # fmt: skip
+
+
+def _other_data(before: Sequence[Result], after: Sequence[Result]) -> list[str]:
+    """The data sets that are not those of the reference, to the last bit."""
+    theirs = {(row.dataset, row.provenance.get("data_sha256")) for row in before}
+    known = {name for name, _ in theirs}
+    others = {row.dataset for row in after if row.dataset in known
+              and (row.dataset, row.provenance.get("data_sha256")) not in theirs}  # fmt: skip
+    return [f"{name} is not the same data as in the reference, to the last bit" for name in sorted(others)]

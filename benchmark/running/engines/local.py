@@ -1,0 +1,124 @@
+"""Jobs on this machine, each in a process of its own that ends with it."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+import sys
+import tempfile
+import types
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, replace
+from multiprocessing.context import BaseContext
+from pathlib import Path
+
+from pebble import CONSTS, ProcessExpired, ProcessPool
+
+from simgap.records import Result
+from simgap.registry import MODELS
+from simgap.running.engines.engine import Event, Running
+from simgap.running.jobs import Job, execute, progress_file
+from simgap.running.workers import Limits, prepare_worker
+
+# Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
+# changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
+PRELOADED = (
+    "simgap.running.jobs",
+    "simgap.running.engines.preloading",
+    "scipy.signal",
+    "scipy.optimize",
+    "scipy.stats",
+)
+PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
+
+# Seconds between two looks of the pool at its processes, of which every job needs a new one.
+CONSTS.sleep_unit = 0.02
+
+
+@dataclass(frozen=True)
+class Local:
+    """At most `workers` jobs at a time."""
+
+    workers: int
+    limits: Limits
+
+    def __call__(self, todo: Sequence[Job]) -> Generator[Event, None, None]:
+        """Rows and what is under way; see Engine."""
+        if not todo:
+            return
+        with _main_left_alone(), contextlib.ExitStack() as stack:
+            notes = stack.enter_context(tempfile.TemporaryDirectory(prefix="simgap", ignore_cleanup_errors=True))
+            limits = replace(self.limits, environment=self.limits.environment | {"SIMGAP_RUN": notes})
+            pool = ProcessPool(min(self.workers, len(todo)), max_tasks=1, initializer=prepare_worker,
+                               initargs=(limits,), context=_context(todo))  # fmt: skip
+            stack.callback(pool.join)
+            stack.callback(pool.stop)  # runs before join, and after Ctrl-C too
+            pending: dict[Future, Job] = {pool.schedule(execute, (job,), timeout=limits.timeout): job for job in todo}
+            while pending:
+                ended, _ = wait(pending, timeout=0.3, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    yield _outcome(future, pending.pop(future), limits)
+                yield tuple(
+                    Running(job, _share(progress_file(notes, job)))
+                    for future, job in pending.items()
+                    if future.running()
+                )
+
+
+def _context(todo: Sequence[Job]) -> BaseContext:
+    """Forked from a process that has imported what the models need, but has done nothing yet; else started anew."""
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    named = {str(name) for job in todo for name in (job.entry.name, *job.entry.params.values())}
+    networks = any(MODELS.module(name).startswith("simgap.neural.") for name in named)
+    context.set_forkserver_preload([*PRELOADED, *(PRELOADED_FOR_NETWORKS if networks else ())])
+    return context
+
+
+def _share(file: Path) -> float:
+    """How far a worker says that its job is; zero if it says nothing."""
+    try:
+        done, total = map(int, file.read_text(encoding="ascii").split())
+        return min(1.0, done / total)
+    except (OSError, ValueError, ZeroDivisionError):
+        return 0.0
+
+
+def _outcome(future: Future, job: Job, limits: Limits) -> list[Result]:
+    """The rows of a job that has ended, however it ended."""
+    match future.exception():
+        case None:
+            return future.result()
+        case TimeoutError():
+            text = f"no result after {limits.timeout:g} s; raise the suite's timeout or give the model less to do"
+            return job.failed("timeout", text)
+        case ProcessExpired() as error:
+            return job.failed("error", f"the worker process {_how_it_ended(error.exitcode)}")
+        case error:
+            return job.failed("error", f"the worker failed: {type(error).__name__}: {error}")
+
+
+def _how_it_ended(exitcode: int | None) -> str:
+    if exitcode is not None and exitcode < 0:
+        with contextlib.suppress(ValueError):
+            name = signal.Signals(-exitcode).name
+            return f"was ended by {name}: a crash in compiled code, or the system had no memory left"
+    by_whom = "the process that starts workers was killed" if exitcode == 255 else "an exit by the model itself"
+    return f"ended with exit code {exitcode}: {by_whom}"
+
+
+@contextlib.contextmanager
+def _main_left_alone() -> Iterator[None]:
+    """Keep workers from importing the caller's script again.
+
+    A script that calls `simgap.run` without an `if __name__ == "__main__"` would start a run within the run.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = types.ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main

@@ -1,0 +1,218 @@
+"""One model on one data set: build, fit, score."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import time
+import traceback
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.metrics import failed_metrics
+from simgap.protocol import Model
+from simgap.records import Dataset, Result, TrainingSet, UnusableInput
+from simgap.registry import MODELS, load_class
+from simgap.results.store import plain
+from simgap.running.provenance import provenance
+from simgap.running.workers import threads_per_worker
+from simgap.tasks import TASKS, USUAL, Task, Trial
+
+# Bytes of a model.json.
+LARGEST_DESCRIPTION = 1 << 20
+# Characters of what a fit says that it chose, and of a message, in a line of results.
+LARGEST_FITTED = 1 << 20
+LONGEST_MESSAGE = 1000
+
+
+class ModelFault(Exception):
+    """A model broke the protocol; the message says how."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model and its scores: one result per test experiment and task."""
+
+    model: Any
+    results: list[Result]
+
+
+def fit(
+    model: str,
+    data: Any,
+    params: dict[str, Any] | None = None,
+    seed: int = 0,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+) -> Fit:
+    """Fit one model to one data set, here and now, and score it on the test experiments.
+
+    `model` is a registered name or `file.py:Class`; `data` a data set, or what `simgap.load` takes; dt in
+    seconds. Raises UnusableInput, and whatever the model's own `fit` raises.
+    """
+    from simgap.data import load
+
+    built = build(model, params or {})  # first, because data may take seconds to load
+    dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
+    about = Result(
+        model=model.rpartition(":")[2], params=plain(params or {}), dataset=dataset.name, experiment="",
+        task="", seed=seed, status="ok",
+        provenance=provenance(threads_per_worker(1)) | {"data_sha256": dataset.sha256},
+    )  # fmt: skip
+    about = fit_model(built, dataset.training, about)
+    return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
+
+
+def load_model(folder: str | Path) -> Any:
+    """The network that its `save` or `simgap fit --save` wrote into a folder. Nothing in the files is executed.
+
+    Raises UnusableInput.
+    """
+    file = Path(folder) / "model.json"
+    try:
+        if file.stat().st_size > LARGEST_DESCRIPTION:
+            raise UnusableInput(f"{file} is larger than any description of a model")
+        about = json.loads(file.read_text(encoding="utf-8"))
+        kind = MODELS[str(about["model"])]
+        load = kind.load
+    except UnusableInput:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise UnusableInput(f"{folder} holds no network of simgap: {' '.join(str(error).split())[:200]}") from error
+    return load(Path(folder), about)
+
+
+def model_class(reference: str) -> type:
+    """The class of a registered name, of `file.py:Class`, or of a `file.py` that holds one. Raises UnusableInput."""
+    found = load_class(reference) if ".py:" in reference or reference.endswith(".py") else MODELS[reference]
+    for method in ("fit", "simulate"):
+        if not callable(getattr(found, method, None)):
+            raise UnusableInput(f"{reference} is no model: it has no method {method}")
+    return found
+
+
+def check_params(reference: str, params: dict[str, Any]) -> None:
+    """Raises UnusableInput when the model takes no such parameters."""
+    signature = inspect.signature(model_class(reference))
+    try:
+        signature.bind(**params)
+    except TypeError as error:
+        known = ", ".join(signature.parameters) or "none"
+        raise UnusableInput(f"{reference}: {error}; its parameters are {known}") from error
+
+
+def build(reference: str, params: dict[str, Any]) -> Model:
+    """A model that is not fitted yet. Raises UnusableInput."""
+    check_params(reference, params)
+    return model_class(reference)(**params)
+
+
+def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
+    """Fit the model; `about` comes back with what the fit chose, its size, seconds and warnings."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        start = time.perf_counter()
+        model.fit(training, about.seed)
+        seconds = time.perf_counter() - start
+    n_params = getattr(model, "n_params", None)
+    return replace(
+        about,
+        fitted=_chosen(model),
+        n_params=int(n_params) if isinstance(n_params, int | np.integer) else None,
+        fit_seconds=seconds,
+        message=_shortened("; ".join(dict.fromkeys(str(w.message) for w in caught))),
+    )
+
+
+def _chosen(model: Model) -> dict[str, Any]:
+    """What the fit chose, if it is of a size for a line of results."""
+    fitted = plain(getattr(model, "fitted", None) or {})
+    size = len(json.dumps(fitted))
+    if size > LARGEST_FITTED:
+        return {"left_out": f"{size} characters, where {LARGEST_FITTED} are taken"}
+    return fitted if isinstance(fitted, dict) else {"fitted": fitted}
+
+
+def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Result) -> list[Result]:
+    """One result per test experiment and task. A model that fails on one is still asked for the others."""
+    results = []
+    for experiment in dataset.test:
+        simulate = CheckedSimulation(model, len(dataset.channels.outputs))
+        trial = Trial(simulate, experiment, dataset.n_init, dataset.channels)
+        results += [_score(trial, simulate, task, about) for task in tasks]
+    units = {channel.name: channel.unit for channel in dataset.channels.outputs}
+    return [replace(result, units=units) for result in results]
+
+
+def _score(trial: Trial, simulate: CheckedSimulation, task: Task, about: Result) -> Result:
+    about = replace(about, experiment=trial.experiment.name, task=task.name)
+    before = simulate.seconds
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # an overflow shows in the figures
+            outcome = task.score(trial)
+    except (Exception, SystemExit) as error:  # a model may raise anything
+        metrics = failed_metrics(trial.channels)
+        return replace(about, status="error", message=reason("simulate", error), metrics=metrics)
+    return replace(
+        about,
+        status="ok" if outcome.finite else "diverged",
+        message=about.message if outcome.finite else "the simulation grew beyond all bounds or is not a number",
+        metrics=outcome.metrics,
+        simulate_seconds=simulate.seconds - before,
+    )
+
+
+@dataclass
+class CheckedSimulation:
+    """`model.simulate` on copies of the data, with its answer checked and its time added up in `seconds`."""
+
+    model: Model
+    ny: int
+    seconds: float = field(default=0.0, init=False)
+
+    def __call__(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Raises ModelFault for a changed input or an answer of the wrong shape."""
+        given = {"u": u.copy(), "y_init": y_init.copy()}
+        start = time.perf_counter()
+        answer = self.model.simulate(given["u"], given["y_init"])
+        self.seconds += time.perf_counter() - start
+        for name, original in (("u", u), ("y_init", y_init)):
+            if not np.array_equal(given[name], original):
+                raise ModelFault(f"it changed its argument {name} in place")
+        if not isinstance(answer, np.ndarray):
+            raise ModelFault(f"it returned a {type(answer).__name__}, where a NumPy array was asked for")
+        if answer.dtype != np.float64:
+            raise ModelFault(f"it returned {answer.dtype} values, where float64 was asked for")
+        expected = (u.shape[0], u.shape[1] - y_init.shape[1], self.ny)
+        if answer.shape != expected:
+            raise ModelFault(f"it returned the shape {answer.shape}, where {expected} was asked for")
+        return np.asarray(answer)
+
+
+def reason(method: str, error: BaseException) -> str:
+    """One line for people: what went wrong in a method of a model, and in which line of whose file."""
+    try:
+        text = _shortened(" ".join(str(error).split()))
+    except Exception as worse:  # of an exception that cannot even say what it is
+        text = f"without words, because its __str__ raised {type(worse).__name__}"
+    if isinstance(error, UnusableInput):
+        return text
+    if isinstance(error, ModelFault):
+        return f"{method} broke the protocol: {text}"
+    frames = traceback.extract_tb(error.__traceback__)
+    frame = next((f for f in reversed(frames) if "site-packages" not in f.filename), frames[-1])
+    return f"{method} raised {type(error).__name__}: {text} ({Path(frame.filename).name}, line {frame.lineno})"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ... ({len(text)} characters)"

@@ -1,0 +1,118 @@
+"""What a run has to do: the jobs that a suite, the user's choices and the stored results leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from simgap.records import Result, UnusableInput
+from simgap.registry import DATASETS
+from simgap.results import store
+from simgap.results.store import plain
+from simgap.running.fitting import check_params
+from simgap.running.jobs import Card, Job, Source, model_sha256
+from simgap.running.suites import Entry, Suite
+
+Note = Callable[[str], None]
+
+
+def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note) -> list[Entry]:
+    """The models to run: those named in `models` and `files` (`file.py:Class`), or else the suite's.
+
+    A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
+    that the user named raises UnusableInput.
+    """
+    by_label = {entry.label: entry for entry in suite.models}
+    named = [by_label.get(name, Entry(name)) for name in models or ()] + [Entry(name) for name in files]
+    entries = []
+    for entry in named or suite.models:
+        try:
+            check_params(entry.name, entry.params)
+        except UnusableInput as error:
+            if named:
+                raise
+            note(f"left out: {error}")
+        else:
+            entries.append(entry)
+    keys = [(entry.label, str(plain(entry.params))) for entry in entries]
+    if twice := [label for label, params in keys if keys.count((label, params)) > 1]:
+        raise UnusableInput(f"two models are called {twice[0]}; give one of them another name")
+    if not entries:
+        raise UnusableInput(f"none of the models of suite {suite.name} can be imported; name one with --models")
+    return entries
+
+
+def sources(datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None) -> list[Source]:
+    """Where the named data sets come from. Columns and dt go to the CSV files among them, if there are."""
+    files = [name for name in datasets if Path(name).is_file()]
+    return [
+        Source(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else Source(name)
+        for name in datasets
+    ]
+
+
+def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple[Source, Card]]:
+    """The data sets to run on, with their cards: those the user named, or else the suite's.
+
+    One of the suite's that is not at hand is noted and left out; one the user named raises UnusableInput.
+    """
+    chosen = []
+    for source in named or [Source(name) for name in suite.datasets]:
+        try:
+            chosen.append((source, Card.of(source.load())))
+        except UnusableInput as error:
+            if named or source.data not in DATASETS:
+                raise
+            note(f"left out: {error}")
+    names = [card.name for _, card in chosen]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise UnusableInput(f"two data sets are called {twice[0]}; give one of them another name")
+    if not chosen:
+        raise UnusableInput(f"none of the data sets of suite {suite.name} is at hand; name one with --datasets")
+    return chosen
+
+
+def plan(
+    suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[Source, Card]], provenance: dict[str, Any]
+) -> list[Job]:
+    """All jobs, one data set after the other, because a worker keeps the last one it loaded.
+
+    Each carries a digest of its model's code: results of the old code must not stand for the new.
+    """
+    digests = {id(entry): {"model_sha256": model_sha256(entry)} for entry in entries}
+    return [
+        Job(entry, source, card, seed, suite.tasks, provenance | digests[id(entry)])
+        for source, card in data
+        for seed in range(suite.seeds)
+        for entry in entries
+    ]
+
+
+def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.Key, Result]:
+    """The stored results of these jobs' models that need not be computed again, by key."""
+    rows = {}
+    for label in {job.entry.label for job in jobs}:
+        path = store.path_of(folder, suite.name, label)
+        rows |= {store.key(row): row for row in (store.read(path) if path.exists() else ())}
+    return {key: row for key, row in rows.items() if row.status in ("ok", "diverged")}
+
+
+def done_already(job: Job, rows: dict[store.Key, Result]) -> list[Result]:
+    """The job's results if all of them are stored and came from the same data and code of the model, else none."""
+    found = [rows.get(store.key(owed)) for owed in job.owed()]
+    wanted = {name: job.about.provenance.get(name) for name in ("data_sha256", "model_sha256")}
+    for row in found:
+        if row is None or any(row.provenance.get(name) != digest for name, digest in wanted.items()):
+            return []
+    return [row for row in found if row is not None]
+
+
+def with_seeds(suite: Suite, seeds: int | None) -> Suite:
+    """The suite with the number of seeds the user asked for. Raises UnusableInput."""
+    if seeds is None:
+        return suite
+    if seeds < 1:
+        raise UnusableInput(f"--seeds {seeds}: give at least one seed")
+    return replace(suite, seeds=seeds)

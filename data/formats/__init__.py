@@ -1,0 +1,1 @@
+"""Files and frames of users, read and written."""

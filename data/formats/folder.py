@@ -1,0 +1,90 @@
+"""A data set folder: dataset.toml and one CSV file per experiment."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+import numpy as np
+
+from simgap.data.formats.description import FILE, Description, read_description
+from simgap.data.formats.sampling import check_time
+from simgap.data.formats.tables import Table, read_csv
+from simgap.data.splits import assemble, hold_out_tails
+from simgap.records import Channels, Dataset, Experiment, UnusableInput
+
+
+def load_folder(folder: Path) -> Dataset:
+    """The data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
+    described = read_description(folder / FILE)
+    files = {split: _matching(folder, split, pattern) for split, pattern in described.splits.items()}
+    names = _experiment_names(folder, files)
+    records = {
+        split: tuple(_experiment(file, names[file], described) for file in found) for split, found in files.items()
+    }
+    train = records["train"]
+    if "valid" in records:
+        valid = records["valid"]
+    else:
+        train, valid = hold_out_tails(train)
+    splits = (train, valid, records["test"])
+    return assemble(described.name, splits, described.channels, described.n_init, str(folder))
+
+
+def experiment_of(table: Table, name: str, channels: Channels, dt: float) -> Experiment:
+    """The table's input and output columns as one experiment, sampled every dt seconds."""
+    u = np.column_stack([table.numbers(channel.name) for channel in channels.inputs])  # [T, nu]
+    y = np.column_stack([table.numbers(channel.name) for channel in channels.outputs])  # [T, ny]
+    return Experiment(name, u, y, dt)
+
+
+def natural_order(name: str) -> tuple[list[str | int], str]:
+    """Sort key that puts "run_10" after "run_9"; no two names share a key."""
+    return [int(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+)", name))], name
+
+
+def _experiment(file: Path, name: str, described: Description) -> Experiment:
+    table = read_csv(file)
+    if described.time is not None:
+        check_time(table, described.time, described.sampling_time)
+    return experiment_of(table, name, described.channels, described.sampling_time)
+
+
+def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
+    """The files of a split in natural order. Raises UnusableInput for none and for one outside the folder."""
+    where = f"{folder / FILE}: splits.{split} = {pattern!r}"
+    for flavour in (PurePosixPath(pattern), PureWindowsPath(pattern)):
+        if flavour.anchor or ".." in flavour.parts or not flavour.parts:
+            raise UnusableInput(f"{where} leads out of the folder; write it like 'train/*.csv'")
+    try:
+        found = sorted(folder.glob(pattern), key=lambda file: natural_order(file.relative_to(folder).as_posix()))
+        inside = [file.resolve().is_relative_to(folder.resolve()) for file in found]
+    except (ValueError, NotImplementedError, OSError, RuntimeError) as error:  # the last for loops of links
+        raise UnusableInput(f"{where} is no usable pattern ({error}); write it like 'train/*.csv'") from None
+    if not found:
+        raise UnusableInput(f"{where} matches no file; add files or correct the pattern")
+    for file, is_inside in zip(found, inside, strict=True):
+        if not is_inside:
+            raise UnusableInput(f"{where} matches {file}, a link out of the folder; copy the file into the folder")
+        if file.is_dir():
+            raise UnusableInput(f"{where} matches {file}, a folder; let it match CSV files only")
+    return found
+
+
+def _experiment_names(folder: Path, files: dict[str, list[Path]]) -> dict[Path, str]:
+    """File -> experiment name: the bare file name where that is unique, else more of the path."""
+    every = [file for found in files.values() for file in found]
+    seen: set[Path] = set()
+    for file in every:
+        if file.resolve() in seen:
+            raise UnusableInput(f"{file} stands in the splits twice; test on what no model has seen")
+        seen.add(file.resolve())
+    inside = [file.relative_to(folder) for file in every]
+    for names in (
+        [file.stem for file in inside],
+        ["_".join(file.with_suffix("").parts) for file in inside],
+        [file.as_posix() for file in inside],
+    ):
+        if len(set(names)) == len(names):
+            break
+    return dict(zip(every, names, strict=True))

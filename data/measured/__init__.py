@@ -1,0 +1,1 @@
+"""Public measured data sets: where they lie and how they are read."""

@@ -1,0 +1,1 @@
+"""The yaw axis of a gimbal, simulated."""

@@ -1,0 +1,1 @@
+"""A diagnosis as a text and as a page."""

@@ -1,0 +1,84 @@
+"""The answer of a diagnosis as the short text that `simgap diagnose` prints."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+
+from simgap.findings import Cause, Findings
+from simgap.reports.diagnosis import numbers, words
+from simgap.reports.rendering import printable
+
+VIEWS = 3  # of what is wrong; the page shows all
+
+
+def diagnosis_text(findings: Findings, width: int = 100) -> str:
+    """What was found, in lines of at most `width` characters that a control engineer can act on.
+
+    Names from data sets are shown, never obeyed: what a terminal would interpret is left out.
+    """
+    paragraphs = [
+        *_wrapped(f"{findings.dataset}: {words.headline(findings)}", width),
+        *_section("Plain linear model", _baseline(findings), width),
+        *_section("What it gets wrong", _wrong(findings), width),
+    ]
+    for i, cause in enumerate(findings.causes, start=1):
+        paragraphs += _section(f"Cause {i}: {words.named(cause, findings)}", _cause(cause), width)
+    if second := words.runner_up(findings):
+        paragraphs += _section("Runner-up", [second], width)
+    if findings.causes:
+        paragraphs += _section("Free-run RMSE on the test experiments", _gain(findings), width)
+    for offer in findings.offers:
+        formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
+        share = f"explains {numbers.percent(offer.explained)} of the squared error of the force, held out"
+        paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
+    paragraphs += _section("About the data", findings.checks, width)
+    if findings.causes:
+        paragraphs += ["", *_wrapped("Ranges in brackets are 95 % intervals where nothing else is said.", width)]
+    return "\n".join(paragraphs) + "\n"
+
+
+def _section(title: str, items: Iterator[str] | list[str] | tuple[str, ...], width: int) -> list[str]:
+    lines = [line for item in items for line in _wrapped(item, width, "  ")]
+    return ["", *_wrapped(title, width), *lines] if lines else []
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """Further lines stand deeper, so that one sees where an item begins."""
+    return textwrap.wrap(
+        printable(text), max(width, 20), initial_indent=indent, subsequent_indent=2 * indent, break_on_hyphens=False
+    )
+
+
+def _baseline(findings: Findings) -> Iterator[str]:
+    plain = findings.baseline
+    yield f"order {words.orders(plain.get('order', 'unknown'))}"
+    for name, rmse in plain.get("rmse", {}).items():
+        fit = numbers.fit(plain.get("fit_percent", {}).get(name, float("nan")))
+        yield f"{name}: free-run RMSE {numbers.amount(rmse, findings.units.get(name, ''))}, fit {fit}"
+
+
+def _wrong(findings: Findings) -> list[str]:
+    views = words.telling(findings)
+    shown = [view for view in views if view.view != words.LAST][:VIEWS] or views[:1]
+    return [view.text for view in shown] or ["No view of its error shows more than chance does."]
+
+
+def _cause(cause: Cause) -> Iterator[str]:
+    yield cause.text
+    for parameter in cause.parameters:
+        yield f"{parameter.name} = {numbers.estimate(parameter)} ({numbers.interval(parameter)})"
+    yield words.evidence(cause)
+    for other in cause.confounded_with:
+        yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."
+
+
+def _gain(findings: Findings) -> Iterator[str]:
+    gain = findings.gain
+    for name, before in gain.before.items():
+        after, unit = gain.after.get(name, float("nan")), findings.units.get(name, "")
+        change = numbers.change(before, after)
+        line = f"{name}: {numbers.amount(before, '')} -> {numbers.amount(after, unit)}"
+        yield f"{line} ({change})" if change else line
+    if findings.left > 0.01:
+        yield f"The input could still predict {numbers.percent(findings.left)} of the plain model's squared error."

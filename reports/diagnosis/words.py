@@ -1,0 +1,117 @@
+"""What the text and the page of a diagnosis have in common: the headline, sentences, and which views to show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from simgap.findings import Cause, Findings, Wrong
+from simgap.reports.diagnosis.numbers import number, percent
+
+CHANCE = 0.01  # views that chance explains as often are not shown
+LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
+# Words by which effects name views that have other names, or several. "input" and "position" take a channel's name.
+ALIASES = {
+    "time": ("time since the start",),
+    "frequency": (LAST,),
+    "first against second half": ("drift within experiment",),
+    "position": ("position", "value", "level"),
+    "velocity": ("velocity", "rate of change"),
+}
+
+
+def headline(findings: Findings) -> str:
+    """The verdict in a sentence."""
+    gain = findings.gain
+    if findings.verdict == "nothing_found":
+        return (
+            "Nothing found: no effect of the catalogue makes the plain linear model simulate these data better, and "
+            "the input predicts hardly anything more of its error."
+        )
+    if findings.verdict == "unexplained":
+        return (
+            "Something is there, but nothing in the catalogue explains it: "
+            f"{percent(findings.left)} of the squared error could still be predicted from the input."
+        )
+    names = [named(cause, findings) for cause in findings.causes]
+    listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    them, size = "it" if len(names) == 1 else "them", abs(gain.share)
+    start = f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments"
+    if not math.isfinite(gain.share):
+        return f"{start} cannot be compared, because a simulation diverges."
+    return f"{start} {'falls' if gain.share >= 0 else 'rises'} by {percent(size)}{_range(findings)}."
+
+
+def named(cause: Cause, findings: Findings) -> str:
+    """The title, with the channel where there are several to choose from."""
+    several = len(findings.inputs) > 1 or len(findings.units) > 1
+    return f"{cause.title} ({cause.channel})" if cause.channel and several else cause.title
+
+
+def evidence(cause: Cause) -> str:
+    """What the effect explains, in training and held out, in one or two sentences."""
+    held_out = (
+        f"on held-out data the squared error is {percent(cause.gain)} smaller with it than without"
+        if cause.gain > 0
+        else "on held-out data the squared error is no smaller with it than without"
+    )
+    remark = (
+        " It belongs to one experiment and cannot be forecast: this is measured with the parameter estimated anew."
+        if cause.per_experiment
+        else ""
+    )
+    return (
+        f"It explains {percent(cause.evidence)} of the plain model's squared error in training (log-likelihood ratio "
+        f"{number(cause.log_likelihood_ratio)}); {held_out}.{remark}"
+    )
+
+
+def runner_up(findings: Findings) -> str:
+    """The best effect that was not named, in a sentence; empty without one."""
+    second = findings.runner_up
+    if not second:
+        return ""
+    gain, margin = second.get("gain"), second.get("margin")
+    told = f"{second.get('title') or second.get('effect')}"
+    if gain is not None:
+        told += f"; by itself it would make the held-out squared error {percent(gain)} smaller"
+    return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
+
+
+def telling(findings: Findings) -> list[Wrong]:
+    """The views that chance does not explain, the one with the largest share first, the least telling ones last."""
+    views = [view for view in findings.wrong if view.chance < CHANCE]
+    return sorted(views, key=lambda view: (view.view == LAST, -view.share))
+
+
+def shows(view: Wrong, cause: Cause) -> bool:
+    """Whether a view is one of those that show the effect."""
+    for name in cause.shows_in:
+        for alias in ALIASES.get(name, (name,)):
+            channel = alias in ("input", "position") and view.view.startswith(f"{alias} ")
+            if view.view == alias or channel:
+                return True
+    return False
+
+
+def orders(order: object) -> str:
+    """2 -> "2"; [2, 1] -> "2, 1", one per plant."""
+    return ", ".join(map(str, order)) if isinstance(order, Sequence) and not isinstance(order, str) else str(order)
+
+
+def shortened(text: str, longest: int = 32) -> str:
+    """Names that leave room for the plot they label."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def capital(text: str) -> str:
+    """The same, at the beginning of a line."""
+    return text[:1].upper() + text[1:]
+
+
+def _range(findings: Findings) -> str:
+    low, high = sorted(math.copysign(100, findings.gain.share) * end for end in (findings.gain.low, findings.gain.high))
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ""
+    places = 0 if high - low > 2 else 1
+    return f" ({low:.{places}f} to {high:.{places}f} %)"

@@ -1,0 +1,17 @@
+"""Answers about measured machines are what they were, tracebacks included; the records are the user's own."""
+
+import json
+import runpy
+from pathlib import Path
+
+import pytest
+
+GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
+
+
+@pytest.mark.parametrize("name", GOLDEN["MEASURED"])
+def test_the_answer_about_a_measured_machine_is_what_it_was(name):
+    if not GOLDEN["folder_of"](name).is_dir():
+        pytest.skip(f"{name} is not at hand: set SIMGAP_DATA to the folder of measured data")
+    kept = json.loads((GOLDEN["KEPT"] / f"{name}.json").read_text(encoding="utf-8"))
+    assert not GOLDEN["differences"](kept, GOLDEN["without_words"](GOLDEN["answer"](name)))

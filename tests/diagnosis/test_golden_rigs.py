@@ -1,0 +1,15 @@
+"""Answers about simulated rigs are what they were: verdicts and names exactly, numbers to 1e-6."""
+
+import json
+import runpy
+from pathlib import Path
+
+import pytest
+
+GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
+
+
+@pytest.mark.parametrize("name", GOLDEN["RIGS"])
+def test_the_answer_about_a_rig_is_what_it_was(name):
+    kept = json.loads((GOLDEN["KEPT"] / f"{name}.json").read_text(encoding="utf-8"))
+    assert not GOLDEN["differences"](kept, GOLDEN["without_words"](GOLDEN["answer"](name)))

@@ -1,0 +1,42 @@
+"""The folders, the names they import as, and who may import whom; the tests of imports and packaging share it."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
+           "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
+
+GROUND = {"records", "protocol", "registry"}
+RUN = {"metrics", "tasks", "results", "running"}
+# Room or module -> what it may import besides itself. "simgap" is the lazy exports of the package.
+MAY_IMPORT: dict[str, set[str]] = {
+    "records": set(),
+    "findings": set(),
+    "protocol": {"records"},
+    "registry": {"records"},
+    "metrics": {"records"},
+    "tasks": {"records", "metrics"},
+    "data": GROUND,
+    "results": GROUND | {"metrics", "tasks", "running.suites"},
+    "running": GROUND | {"metrics", "tasks", "results", "data"},
+    "greybox": GROUND | {"findings"},
+    "error_views": {"records", "metrics", "findings"},
+    "baselines": GROUND | {"data", "greybox"},
+    "neural": GROUND | {"data"},
+    "contract": GROUND | RUN | {"data"},
+    "reports": {"records", "metrics", "results", "findings", "greybox.effects"},
+    # An answer shows itself in a notebook, so that diagnosis lies above reports.
+    "diagnosis": GROUND | RUN | {"findings", "data", "greybox", "error_views", "reports"},
+    "simgap": GROUND | RUN | {"data", "diagnosis", "reports"},
+    "cli": GROUND | RUN | {"contract", "findings", "data", "greybox", "diagnosis", "reports", "simgap"},
+}
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the distribution and its file."""
+    found = {}
+    for folder, package in FOLDERS.items():
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            parts = path.relative_to(ROOT / folder).with_suffix("").parts
+            found[".".join((package, *parts)).removesuffix(".__init__")] = path
+    return found

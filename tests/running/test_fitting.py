@@ -1,0 +1,38 @@
+import pytest
+
+import simgap
+from simgap.records import UnusableInput
+from simgap.running.fitting import build, check_params
+
+
+def test_fit_returns_the_fitted_model_and_its_scores(dataset, example):
+    done = simgap.fit(example("Scaled"), dataset, params={"factor": 2.0}, seed=5)
+    assert done.model.factor == 2
+    assert [(row.experiment, row.task) for row in done.results] == [
+        ("first", "free_run"), ("first", "forecast"), ("second", "free_run"), ("second", "forecast"),
+    ]  # fmt: skip
+    assert done.results[0].params == {"factor": 2.0}
+    assert done.results[0].fitted["seed"] == 5
+
+
+def test_fit_takes_what_load_takes(folder, example):
+    assert simgap.fit(example("Mean"), folder).results[0].dataset == "noise"
+
+
+def test_fit_raises_what_the_model_raises(dataset, example):
+    with pytest.raises(RuntimeError, match="no luck"):
+        simgap.fit(example("RaisesInFit"), dataset)
+
+
+def test_an_unknown_parameter_is_refused_with_the_known_ones(example):
+    with pytest.raises(UnusableInput, match="unexpected keyword argument 'fctor'; its parameters are factor"):
+        build(example("Scaled"), {"fctor": 1})
+    check_params(example("Scaled"), {"factor": 1})
+
+
+def test_every_exported_name_exists():
+    for name in simgap.__all__:
+        assert getattr(simgap, name) is not None
+    assert set(simgap.__all__) <= set(dir(simgap))
+    with pytest.raises(AttributeError, match="no attribute 'nosuch'"):
+        _ = simgap.nosuch

@@ -1,0 +1,105 @@
+import pytest
+
+from simgap.records import UnusableInput
+from simgap.registry import DATASETS, MODELS
+from simgap.running.suites import Entry, load_suite, suite_names
+
+
+def written(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.mark.parametrize("name", suite_names())
+def test_every_suite_names_known_models_and_data_sets(name):
+    suite = load_suite(name)
+    assert set(suite.datasets) <= set(DATASETS)
+    assert {entry.name for entry in suite.models} <= set(MODELS)
+
+
+def test_full_is_everything():
+    suite = load_suite("full")
+    assert set(suite.datasets) == set(DATASETS) - {"gimbal_short"}
+    assert [entry.name for entry in suite.models if not entry.label.endswith(" windowed")] == list(MODELS)
+
+
+def test_smoke_is_every_model_but_on_little_data():
+    suite = load_suite("smoke")
+    assert {entry.name for entry in suite.models} == set(MODELS)
+    assert suite.datasets == ("gimbal_short",)
+
+
+def test_the_paper_has_twenty_networks_and_four_classical_models():
+    entries = load_suite("paper").models
+    delta = [entry for entry in entries if entry.label.endswith(" delta")]
+    assert (len(entries), len(delta)) == (24, 12)
+    assert all(entry.name == "delta" for entry in delta)
+
+
+def test_a_user_writes_a_suite_with_labels_and_parameters(tmp_path):
+    text = """
+    datasets = ["gimbal"]
+    tasks = ["free_run"]
+    seeds = 3
+    timeout = 1.5
+    [[models]]
+    name = "arx"
+    label = "ARX321"
+    params = { na = 3 }
+    """
+    suite = load_suite(written(tmp_path, text))
+    assert suite.models == (Entry("arx", {"na": 3}, "ARX321"),)
+    assert (suite.name, suite.tasks, suite.seeds, suite.timeout) == ("mine", ("free_run",), 3, 1.5)
+
+
+def test_a_table_takes_the_place_of_a_model_that_all_has_brought(tmp_path):
+    text = '[[models]]\nname = "all"\n[[models]]\nname = "gru"\nparams = { epochs = 1 }\ngpus = 0.5\n'
+    entries = {entry.label: entry for entry in load_suite(written(tmp_path, text)).models}
+    assert set(entries) == set(MODELS)
+    assert (entries["gru"].params, entries["gru"].gpus) == ({"epochs": 1}, 0.5)
+
+
+def test_all_models_and_one_more_fit_in_one_suite(tmp_path):
+    text = '[[models]]\nname = "all"\n[[models]]\nname = "arx"\nlabel = "ARX321"\n'
+    assert [entry.label for entry in load_suite(written(tmp_path, text)).models] == [*MODELS, "ARX321"]
+
+
+def test_paths_in_a_suite_count_from_its_file(tmp_path):
+    (tmp_path / "my_data").mkdir()
+    (tmp_path / "my_model.py").touch()
+    text = 'datasets = ["my_data"]\n[[models]]\nname = "my_model.py:Mine"\n'
+    suite = load_suite(written(tmp_path, text))
+    assert suite.datasets == (str(tmp_path / "my_data"),)
+    assert suite.models == (Entry(f"{tmp_path / 'my_model.py'}:Mine", {}, "Mine"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("title = ", "Invalid value"),
+        ("titel = 1", "unknown key 'titel'"),
+        ("title = 1", "title is 1"),
+        ("seeds = true", "seeds is True"),
+        ("seeds = 0", "must be positive"),
+        ("timeout = nan", "must be positive"),
+        ('tasks = ["predict"]', "no task 'predict'"),
+        ("tasks = []", "tasks is empty"),
+        ("tasks = [1]", "no task '1'"),
+        ("datasets = [1]", "datasets must be"),
+        ('datasets = "some"', "datasets must be"),
+        ('models = ["arx"]', "models must be"),
+        ('[[models]]\nlabel = "x"', "needs a name"),
+        ('[[models]]\nname = "arx"\nparams = 3', "needs a name"),
+        ('[[models]]\nname = "arx"\nparam = {}', "unknown key 'param'"),
+    ],
+)
+def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
+    with pytest.raises(UnusableInput, match=r"mine\.toml") as refusal:
+        load_suite(written(tmp_path, text))
+    assert complaint in str(refusal.value)
+
+
+def test_an_unknown_suite_is_refused_with_the_known_ones():
+    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are full, paper, smoke"):
+        load_suite("nosuch")
