@@ -1,4 +1,4 @@
-"""A black-box model that is told what the named effects do."""
+"""A black-box model with what physical effects do as further inputs."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class Informed:
         self.grey.fit(data, seed)
         n = data.n_init
 
-        def told(x: Experiment) -> Experiment:
+        def with_effects(x: Experiment) -> Experiment:
             return Experiment(x.name, self._inputs(x.u[None], x.y[None, :n])[0], x.y, x.dt)
 
-        train = tuple(told(x) for x in data.train if len(x) > n)
+        train = tuple(with_effects(x) for x in data.train if len(x) > n)
         added = tuple(Channel(f"effect{i}") for i in range(train[0].u.shape[1] - data.train[0].u.shape[1]))
         channels = Channels(data.channels.inputs + added, data.channels.outputs)
-        valid = tuple(told(x) for x in data.valid if len(x) > n)
+        valid = tuple(with_effects(x) for x in data.valid if len(x) > n)
         self.model = MODELS[self.inner]()
         self.model.fit(replace(data, train=train, valid=valid, channels=channels), seed)
 
@@ -54,8 +54,8 @@ class Informed:
     def _inputs(self, u: np.ndarray, y_init: np.ndarray) -> Float[np.ndarray, "B T nue"]:
         """The inputs, and after them one column for each effect."""
         columns = [u]
-        for machine in self.grey.machines:
-            columns.append(machine.shares(u, y_init[:, :, list(machine.outputs)]))
+        for plant in self.grey.plants:
+            columns.append(plant.contributions(u, y_init[:, :, list(plant.outputs)]))
         return np.concatenate(columns, axis=2)
 
     @property

@@ -24,7 +24,15 @@ class Value:
 
 @dataclass(frozen=True)
 class Wrong:
-    """One view of what the plain model gets wrong: the share of the squared error that the view explains."""
+    """One view of what a simulation gets wrong: of the error y - y_hat of one output.
+
+    `share` is the part of the mean squared error that the mean errors of the view's bins (or its strongest band)
+    explain beyond chance; `chance` is how often chance alone explains as much (p-value, for this view by itself).
+    `text` says it in a sentence. For plots: `at` holds the bins' centres, in `unit`, and `error` the mean errors
+    there (the RMS errors for bands and sizes), in the unit of the output. For "experiment" and its relatives `at`
+    counts experiments (or their kinds) from 1, and the halves of experiment i are at i - 0.25 and i + 0.25. The offset
+    is at 0; directions are -1 (back), 0 (rest) and 1 (forwards).
+    """
 
     view: str
     output: str

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from simgap.findings import Findings
+from simgap.findings import Cause, Findings
+from simgap.greybox.model import GreyBoxModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,7 +15,7 @@ class Diagnosis:
 
     findings: Findings
     seconds: float
-    model: Any
+    model: GreyBoxModel
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "findings", replace(self.findings, seconds=self.seconds))
@@ -25,7 +26,7 @@ class Diagnosis:
         return self.findings.verdict
 
     @property
-    def causes(self) -> tuple[Any, ...]:
+    def causes(self) -> tuple[Cause, ...]:
         """The named effects, in the order of what they explain."""
         return self.findings.causes
 

@@ -10,12 +10,14 @@ import numpy as np
 
 from simgap.diagnosis import checks, gains
 from simgap.diagnosis.answer import Diagnosis
-from simgap.diagnosis.causes import causes_of, runner_up
 from simgap.error_views.views import views
-from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
+from simgap.findings import Cause, Findings, Offer, Trace, Verdict, Wrong
+from simgap.greybox.evidence import Evidence
+from simgap.greybox.identification import identify
+from simgap.greybox.leftover import formula, look_for_more
+from simgap.greybox.model import GreyBoxModel
 from simgap.metrics import relative
 from simgap.records import Dataset
-from simgap.registry import MODELS
 
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
 LEFT_OF_PLAIN = 0.05
@@ -45,14 +47,15 @@ def diagnose(
 
     begin = time.perf_counter()
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
-    model = MODELS["greybox-auto"]()
-    model.fit(dataset.training, seed)
-    plain = model.plain()
+    identified = identify(dataset.training)
+    model = GreyBoxModel([one.plant for one in identified])
+    plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
-    after = [gains.best_run(model, x, dataset.n_init) for x in dataset.test]
-    causes = causes_of(model, dataset.channels, profiles)
-    left, offers = _left(model, dataset)
-    explained = min((part.explained for part in model.parts()), default=0.0) if causes else 0.0
+    after = [model.simulate_anew(x, dataset.n_init) for x in dataset.test]
+    evidence = [Evidence(one, dataset.channels) for one in identified]
+    causes = _causes(evidence, profiles)
+    left, offers = _left(evidence, dataset)
+    explained = min((plant.explained for plant in evidence), default=0.0) if causes else 0.0
     verdict: Verdict = "named" if causes else "nothing_found"
     if left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained:
         verdict, causes = "unexplained", ()
@@ -63,7 +66,7 @@ def diagnose(
         baseline=_baseline(plain, dataset, before),
         wrong=_wrong(plain, dataset, seed) if views_too else (),
         causes=causes,
-        runner_up=runner_up(model) if verdict == "named" else None,
+        runner_up=_runner_up(evidence) if verdict == "named" else None,
         gain=gains.measure(dataset, before, after, seed),
         seconds=0.0,
         units={channel.name: channel.unit for channel in dataset.channels.outputs},
@@ -78,7 +81,22 @@ def diagnose(
     return Diagnosis(findings, time.perf_counter() - begin, model)
 
 
-def _baseline(plain: Any, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, Any]:
+def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
+    """List the named effects of all plants in the order of what they explain."""
+    causes = [cause for plant in evidence for cause in plant.causes(profiles)]
+    return tuple(sorted(causes, key=lambda cause: -cause.evidence))
+
+
+def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:
+    """Describe the best single effect that was not named, and how far it stayed behind."""
+    rivals = [rival for plant in evidence for rival in plant.runners_up()]
+    if not rivals:
+        return None
+    best = max(rivals, key=lambda rival: rival.gain)
+    return {"effect": best.effect.name, "title": best.effect.title, "gain": best.gain, "margin": best.behind}
+
+
+def _baseline(plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, Any]:
     rmse, fit = {}, {}
     y = np.concatenate([x.y[dataset.n_init :] for x in dataset.test])
     y_hat = np.concatenate(before)
@@ -90,7 +108,7 @@ def _baseline(plain: Any, dataset: Dataset, before: Sequence[np.ndarray]) -> dic
     return {"order": orders[0] if len(orders) == 1 else orders, "rmse": rmse, "fit_percent": fit}
 
 
-def _wrong(plain: Any, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:
+def _wrong(plain: GreyBoxModel, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:
     """The views of the plain model's free runs on training and validation data; the test split is not looked at."""
     experiments, samples = [], 0
     for x in (*dataset.training.train, *dataset.training.valid):
@@ -99,23 +117,19 @@ def _wrong(plain: Any, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:
             samples += len(experiments[-1])
     simulated = [gains.free_run(plain, x, dataset.n_init) for x in experiments]
     seen = views(experiments, simulated, dataset.channels, dataset.n_init, seed)
-    return tuple(
-        Wrong(view.view, view.output, view.share, view.chance, view.text, view.at, view.error, view.unit)
-        for view in seen
-        if view.chance < MORE_THAN_CHANCE and view.share > 0.01
-    )
+    return tuple(view for view in seen if view.chance < MORE_THAN_CHANCE and view.share > 0.01)
 
 
-def _left(model: Any, dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:
-    """The largest share of the plain model's squared error that is left and could be predicted, and formulas for it."""
+def _left(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:
+    """Find the largest share of the plain model's squared error that could still be predicted, and formulas for it."""
     left, offers = 0.0, []
-    for part in model.parts():
-        rest = part.leftover()
-        left = max(left, rest.share * (1 - part.explained))
-        if rest.share * (1 - part.explained) > LEFT_OF_PLAIN:
-            from simgap.diagnosis.offers import formula
-
-            offers.append(formula(rest, dataset.channels.outputs[part.outputs[0]]))
+    for plant in evidence:
+        selection = plant.selection
+        rest = look_for_more(selection.trial.estimate, selection.baseline.train)
+        share = rest.share * (1 - plant.explained)
+        left = max(left, share)
+        if share > LEFT_OF_PLAIN:
+            offers.append(formula(rest, dataset.channels.outputs[selection.baseline.outputs[0]]))
     return left, tuple(offers)
 
 

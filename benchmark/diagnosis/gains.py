@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.findings import Gain
+from simgap.protocol import Model
 from simgap.records import Dataset, Experiment
 
 RESAMPLED = 2000
 BLOCKS = 20  # of a single test experiment
 
 
-def free_run(model: Any, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
-    """The free run of one experiment from its first n_init samples, rows n_init .. T-1."""
+def free_run(model: Model, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+    """Simulate rows n_init .. T-1 of one experiment from its first n_init samples."""
     return model.simulate(experiment.u[None], experiment.y[None, :n_init])[0]
-
-
-def best_run(model: Any, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
-    """The same, with the parameters that belong to this experiment alone estimated from it."""
-    return model.simulate_anew(experiment, n_init)
 
 
 def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray], seed: int) -> Gain:

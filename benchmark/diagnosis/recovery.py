@@ -197,12 +197,14 @@ def oracle(dataset: Dataset, hidden: Sequence[str]) -> tuple[float, float]:
     for effects in ((), tuple(hidden)):
         model: Any = MODELS["greybox"](effects=effects)
         model.fit(dataset.training, 0)
-        run_one = gains.best_run if effects else gains.free_run
-        runs = [run_one(model, x, dataset.n_init) for x in dataset.test]
+        runs = [
+            model.simulate_anew(x, dataset.n_init) if effects else gains.free_run(model, x, dataset.n_init)
+            for x in dataset.test
+        ]
         errors = [
             np.sum((x.y[dataset.n_init :, 0] - run[:, 0]) ** 2) for x, run in zip(dataset.test, runs, strict=True)
         ]
         squares.append(sum(errors))
         likelihood.append(model.log_likelihood())
-    ratio = likelihood[1] - likelihood[0] + sum(off.log_likelihood_ratio for m in model.machines for off in m.outliers)
+    ratio = likelihood[1] - likelihood[0] + sum(off.log_likelihood_ratio for p in model.plants for off in p.outliers)
     return float(1 - squares[1] / squares[0]), float(ratio)

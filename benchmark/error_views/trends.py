@@ -9,14 +9,15 @@ from jaxtyping import Int
 
 from simgap.error_views import chance
 from simgap.error_views.correlation import blocks, means
-from simgap.error_views.errors import Errors, View
+from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
 from simgap.error_views.wording import amount, between, number, off, percent, rate, span
+from simgap.findings import Wrong
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
 
 
-def offset(e: Errors) -> Iterator[View]:
+def offset(e: Errors) -> Iterator[Wrong]:
     """The mean error: a bias of the sensor, a constant load, a wrong operating point."""
     mean = float(e.error.mean())
     n = len(e.lengths)
@@ -27,10 +28,10 @@ def offset(e: Errors) -> Iterator[View]:
     else:
         share, p = chance.by_trend(e.error, np.full(len(e.error), mean), 1, 1, e.experiment)
     text = f"The simulation of {e.channel.name} is {off(mean, e.channel.unit)} on average: {_squared(share)}."
-    yield View("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
+    yield Wrong("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
 
 
-def time_since_start(e: Errors) -> Iterator[View]:
+def time_since_start(e: Errors) -> Iterator[Wrong]:
     """The mean error by the time since the start, and how the RMS error grows."""
     unit, seconds = e.channel.unit, e.sample * e.dt
     # Few experiments of slow noise wander like a trend; many bins would also take away what shows how slow it is.
@@ -48,10 +49,10 @@ def time_since_start(e: Errors) -> Iterator[View]:
         f"{amount(rms[0], unit)}) and {off(mean[-1], unit)} {last} after it (RMS error {amount(rms[-1], unit)}): "
         f"{_squared(share)}."
     )
-    yield View("time since the start", e.channel.name, share, p, text, bins.centres, _floats(mean), "s")
+    yield Wrong("time since the start", e.channel.name, share, p, text, bins.centres, _floats(mean), "s")
 
 
-def drift(e: Errors) -> Iterator[View]:
+def drift(e: Errors) -> Iterator[Wrong]:
     """A straight line in each experiment, with a slope of its own; shown as the means of its halves."""
     lengths, name, unit = np.array(e.lengths), e.channel.name, e.channel.unit
     if lengths.min() < 8:
@@ -70,10 +71,10 @@ def drift(e: Errors) -> Iterator[View]:
         f"{', the most of all experiments' if count > 1 else ''}): {_squared(share)}."
     )
     at = tuple(float(i + side) for i in range(1, count + 1) for side in (-0.25, 0.25))
-    yield View("drift within experiment", name, share, p, text, at, _floats(mean), "")
+    yield Wrong("drift within experiment", name, share, p, text, at, _floats(mean), "")
 
 
-def experiments(e: Errors) -> Iterator[View]:
+def experiments(e: Errors) -> Iterator[Wrong]:
     """The mean and the size of the error by experiment, and by kind of experiment."""
     names, count = e.names, len(e.names)
     if count < 2:
@@ -95,7 +96,7 @@ def experiments(e: Errors) -> Iterator[View]:
         yield _by_size(e, "size by kind of experiment", labels, kind, *chance.by_size(sizes, kind, e.seed))
 
 
-def band(e: Errors) -> Iterator[View]:
+def band(e: Errors) -> Iterator[Wrong]:
     """The octave below the Nyquist frequency that holds most of the error's power."""
     nyquist, name = 0.5 / e.dt, e.channel.name
     centred = [part - part.mean() for part in e.parts()]
@@ -118,12 +119,12 @@ def band(e: Errors) -> Iterator[View]:
     filled = np.unique(label)
     rms = np.sqrt(np.bincount(label, power)[filled] / power.sum() * variance)
     at = _floats((edges[filled] + edges[filled + 1]) / 2 * nyquist)
-    yield View("frequency band", name, share, p, text, at, _floats(rms), "Hz")
+    yield Wrong("frequency band", name, share, p, text, at, _floats(rms), "Hz")
 
 
 def _by_mean(
     e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
-) -> View:
+) -> Wrong:
     of_sample = group[e.experiment]
     mean = np.bincount(of_sample, e.error) / np.bincount(of_sample)
     high, low = int(np.argmax(mean)), int(np.argmin(mean))
@@ -132,12 +133,12 @@ def _by_mean(
         f"The simulation of {e.channel.name} is {off(mean[high], unit)} in {labels[high]} and "
         f"{off(mean[low], unit)} in {labels[low]}: {_squared(share)}."
     )
-    return View(view, e.channel.name, share, p, text, _counted(mean), _floats(mean), "")
+    return Wrong(view, e.channel.name, share, p, text, _counted(mean), _floats(mean), "")
 
 
 def _by_size(
     e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
-) -> View:
+) -> Wrong:
     of_sample = group[e.experiment]
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)
     rms = np.sqrt(squared / count)
@@ -147,7 +148,7 @@ def _by_size(
         f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
         f"those above the average hold {percent(share)} of the squared error beyond their part."
     )
-    return View(view, e.channel.name, share, p, text, _counted(rms), _floats(rms), "")
+    return Wrong(view, e.channel.name, share, p, text, _counted(rms), _floats(rms), "")
 
 
 def _signed(value: float, unit: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.error_views import chance, trends
-from simgap.error_views.errors import Errors, View, errors
+from simgap.error_views.errors import Errors, errors
 from simgap.error_views.variables import (
     Bins,
     amplitude,
@@ -19,10 +19,9 @@ from simgap.error_views.variables import (
     derivative,
 )
 from simgap.error_views.wording import off, percent, rate
+from simgap.findings import Wrong
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
-
-__all__ = ["View", "views"]
 
 NEGLIGIBLE = 1e-12  # an error this much smaller than the signal is rounding
 SMALLEST = 1e-150  # whose square is still a float
@@ -34,7 +33,7 @@ def views(
     channels: Channels,
     n_init: int,
     seed: int = 0,
-) -> list[View]:
+) -> list[Wrong]:
     """Every view of the error e = y - y_hat of every output, the one that explains most first.
 
     `simulated[i]` [T - n_init, ny] holds rows n_init .. T-1 of the free run of `experiments[i]`. All views are
@@ -43,7 +42,7 @@ def views(
     diverged is left out; an output without error has no views.
     """
     pairs = [(x, y_hat) for x, y_hat in zip(experiments, simulated, strict=True) if len(y_hat) and is_finite(y_hat)]
-    found: list[View] = []
+    found: list[Wrong] = []
     for output in range(len(channels.outputs) if pairs else 0):
         e = errors(pairs, channels, output, n_init, seed)
         size = np.abs(e.y_hat[:, output] + e.error).max()
@@ -52,7 +51,7 @@ def views(
     return sorted(found, key=lambda view: -view.share)
 
 
-def _views_of_output(e: Errors, output: int) -> Iterator[View]:
+def _views_of_output(e: Errors, output: int) -> Iterator[Wrong]:
     yield from trends.offset(e)
     if np.ptp(e.error) <= 1e-9 * np.abs(e.error).max():
         return  # a constant has no other sides
@@ -94,7 +93,7 @@ def _by_motion(e: Errors, output: int) -> Iterator[tuple[str, str, Bins | None]]
     yield "time since reversal", "s", bin_reversals(v, e.lengths, e.dt, unit)
 
 
-def _binned(e: Errors, view: str, unit: str, bins: Bins) -> View:
+def _binned(e: Errors, view: str, unit: str, bins: Bins) -> Wrong:
     """The view of the mean error in bins. Where bins have parents, what they add to the means of the parents."""
     n = len(bins.centres)
     parents = np.array(bins.parents or [0] * n)
@@ -109,7 +108,7 @@ def _binned(e: Errors, view: str, unit: str, bins: Bins) -> View:
         f"{off(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
         f"{', beyond what the direction explains' if bins.parents else ''}."
     )
-    return View(view, name, share, p, text, bins.centres, tuple(map(float, mean)), unit)
+    return Wrong(view, name, share, p, text, bins.centres, tuple(map(float, mean)), unit)
 
 
 def _extremes(mean: Float[np.ndarray, " B"], count: np.ndarray, parents: np.ndarray) -> tuple[int, int]:

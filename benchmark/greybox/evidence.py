@@ -1,4 +1,4 @@
-"""What a search found out about one plant, in the numbers that a diagnosis reports."""
+"""What speaks for each effect that was selected, in the records of a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,196 +7,213 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
+from scipy.stats import t as student
 
+from simgap.findings import Cause, Profile, Separation, Value
+from simgap.greybox.effects.effect import Effect
+from simgap.greybox.effects.outliers import Outliers as OutlierEffect
 from simgap.greybox.fitting import Problem
-from simgap.greybox.leftover import Leftover, look_for_more
-from simgap.greybox.model import Machine
+from simgap.greybox.identification import Identified
+from simgap.greybox.model import FittedPlant
+from simgap.greybox.normal_equations import NormalEquations
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Term
-from simgap.greybox.selection import Search
-from simgap.greybox.trial import Trial, replaces
+from simgap.greybox.selection import Selection
+from simgap.greybox.trial import Trial, significant
 from simgap.records import Channels
-from simgap.registry import EFFECTS
 
-ENOUGH = 20_000  # samples for a profile; of longer records it is drawn from the excerpts of the search
+# Two sets of effects whose scores (log-likelihood, less what the parameters cost) differ by less are not told apart.
+CONFOUNDED = 6.0
+ENOUGH = 20_000  # samples for a profile; of longer records it is drawn from the excerpts of the selection
 PROFILE = (-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0)  # half widths of the 95 % interval
-
-
-@dataclass(frozen=True)
-class Number:
-    """A parameter with its 95 % interval."""
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Named:
-    """An effect of the model: shares of squared errors that it explains, and its parameters."""
-
-    term: Term
-    evidence: float
-    gain: float
-    log_likelihood_ratio: float
-    parameters: tuple[Number, ...]
+BLOCKS = 40
 
 
 @dataclass(frozen=True)
 class Rival:
     """Another effect: the held-out share it would explain, and how far its score stays behind."""
 
-    name: str
+    effect: Effect
     gain: float
     behind: float
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """One plant: the search that found its effects, and the machine fitted to all training data."""
+class Evidence:
+    """The evidence about one plant: what each effect explains, its rivals, its parameters with intervals."""
 
-    search: Search
-    machine: Machine
-
-    @property
-    def outputs(self) -> tuple[int, ...]:
-        """Which outputs of the data set the plant has."""
-        return self.machine.outputs
+    identified: Identified
+    channels: Channels
 
     @property
-    def found(self) -> Trial:
-        """The model that the search ended with."""
-        return self.search.path[-1]
+    def selection(self) -> Selection:
+        """The selection of effects."""
+        return self.identified.selection
 
     @property
     def explained(self) -> float:
         """Share of the plain model's squared error in training that the effects explain together."""
-        return 1 - self.found.estimate.squares / self.search.plain_squares
+        return 1 - self.selection.trial.estimate.squares / self.selection.baseline.squares
 
     @cached_property
-    def losses(self) -> list[tuple[Term, Trial]]:
+    def _losses(self) -> list[tuple[Term, Trial]]:
         """Every effect with the model that does without it, the most missed first."""
-        return self.search.losses(self.found)
+        without = [(term, self.selection.without(term)) for term in self.selection.trial.terms]
+        return sorted(without, key=lambda pair: -pair[1].estimate.squares)
 
-    def named(self) -> list[Named]:
-        """The effects in the order of what they explain."""
-        plain, here = self.search.plain_squares, self.found
-        low, high = self.machine.intervals() if here.terms else (np.zeros(0), np.zeros(0))
-        named = [self._outlier(found) for found in self.search.outliers]
-        for term, without in self.losses:
-            evidence = (without.estimate.squares - here.estimate.squares) / plain
-            gain = 1 - here.blocks.sum() / max(without.blocks.sum(), 1e-300)
-            ratio = here.train - without.train
-            if term.effect.obvious:  # seen in the readings, and confirmed by plain squares
-                ratio = -0.5 * self.search.train.samples * math.log(here.estimate.squares / without.estimate.squares)
-            named.append(Named(term, float(evidence), float(gain), ratio, self._numbers(term, low, high)))
-        return named
+    @cached_property
+    def _intervals(self) -> tuple[np.ndarray, np.ndarray]:
+        return intervals(self.identified.plant)
 
-    def _outlier(self, found: Outliers) -> Named:
-        term = Term(EFFECTS["outliers"](), found.output)
-        rate, size = term.effect.parameters(self.search.structure.scenes.outputs[found.output])
-        reach = 1.96 * math.sqrt(found.rate * (1 - found.rate) / self.search.train.samples)
-        wide = 1.96 / math.sqrt(2 * max(1.0, found.rate * self.search.train.samples))
-        numbers = (
-            Number(rate.name, rate.unit, found.rate, max(0.0, found.rate - reach), found.rate + reach),
-            Number(size.name, size.unit, found.size, found.size * (1 - wide), found.size * (1 + wide)),
-        )
-        return Named(term, found.share, found.share, found.log_likelihood_ratio, numbers)
-
-    def _numbers(self, term: Term, low: np.ndarray, high: np.ndarray) -> tuple[Number, ...]:
-        estimate = self.machine.estimate
-        structure = estimate.structure
-        if term in structure.local:
-            parameter = structure.parameters_of(term)[0]
-            values = estimate.local[:, structure.order + structure.local.index(term)]
-            spread = float(np.sqrt(np.mean(values**2)))
-            return (
-                Number(f"{parameter.name}, rms over experiments", parameter.unit, spread, float(np.min(np.abs(values))),
-                       float(np.max(np.abs(values)))),
-            )  # fmt: skip
-        at = structure.term_at(term)
-        return tuple(
-            Number(p.name, p.unit, float(value), float(a), float(b))
-            for p, value, a, b in zip(structure.parameters_of(term), estimate.theta[at], low[at], high[at], strict=True)
-        )
-
-    def rivals(self, term: Term) -> list[Rival]:
-        """What could stand in the place of an effect, the nearest first; the other effects stay."""
-        if term.effect.name == "outliers":
-            return []
-        without = dict(self.losses)[term]
-        trials = self.search.round(without.estimate)
-        others = []
-        for trial in trials:
-            new = [t for t in trial.terms if t not in without.terms]
-            if (
-                new
-                and not replaces(new[0], term)
-                and new[0].effect.name != term.effect.name
-                and self.search.significant(without, trial)
-            ):
-                gain = 1 - trial.blocks.sum() / max(without.blocks.sum(), 1e-300)
-                others.append(Rival(new[0].effect.name, float(gain), self.found.score - trial.score))
-        return others
+    def causes(self, profiles: bool = False) -> list[Cause]:
+        """List the effects in the order of what they explain, with their likelihood profiles if asked for."""
+        of_outliers = [self._outlier_cause(outliers) for outliers in self.selection.baseline.outliers]
+        return of_outliers + [self._cause(term, without, profiles) for term, without in self._losses]
 
     def runners_up(self) -> list[Rival]:
-        """The other effects of the round in which the first one was chosen."""
-        taken = set(self.found.names)
+        """List the other effects of the last round that began without any."""
+        chosen = self.selection.trial
+        first = [r for r in self.selection.rounds if not r.before.terms and len(r.trials) > 1][-1:]
+        return [
+            Rival(trial.terms[-1].effect, gained(r.before, trial), r.trials[0].score - trial.score)
+            for r in first
+            for trial in r.trials
+            if not set(chosen.names) & set(trial.names)
+            and not any(trial.terms[-1].replaces(term) for term in chosen.terms)
+        ]
+
+    def _cause(self, term: Term, without: Trial, profiles: bool) -> Cause:
+        baseline, chosen, effect = self.selection.baseline, self.selection.trial, term.effect
+        ratio = chosen.train - without.train
+        if effect.visible_in_readings:  # and confirmed by plain squares
+            ratio = -0.5 * baseline.train.samples * math.log(chosen.estimate.squares / without.estimate.squares)
+        values = self._values(term)
+        rivals = [rival for rival in self._rivals(term, without) if rival.behind < CONFOUNDED]
+        return Cause(
+            effect.name, effect.title, effect.describe({value.name: value.value for value in values}),
+            effect.reference, self._channel(term),
+            evidence=float((without.estimate.squares - chosen.estimate.squares) / baseline.squares),
+            gain=gained(without, chosen),
+            log_likelihood_ratio=ratio,
+            parameters=values,
+            per_experiment=effect.per_experiment,
+            confounded_with=tuple(separation(effect, rival.effect) for rival in rivals),
+            shows_in=effect.shows_in,
+            profiles=self._profiles(term) if profiles else (),
+        )  # fmt: skip
+
+    def _outlier_cause(self, outliers: Outliers) -> Cause:
+        effect, baseline = OutlierEffect(), self.selection.baseline
+        term, samples = Term(effect, outliers.output), baseline.train.samples
+        rate, size = baseline.plant.parameters_of(term)
+        reach = 1.96 * math.sqrt(outliers.rate * (1 - outliers.rate) / samples)
+        wide = 1.96 / math.sqrt(2 * max(1.0, outliers.rate * samples))
+        values = (
+            Value(rate.name, rate.unit, outliers.rate, max(0.0, outliers.rate - reach), outliers.rate + reach),
+            Value(size.name, size.unit, outliers.size, outliers.size * (1 - wide), outliers.size * (1 + wide)),
+        )
+        return Cause(
+            effect.name, effect.title, effect.describe({value.name: value.value for value in values}),
+            effect.reference, self._channel(term),
+            evidence=outliers.share, gain=outliers.share, log_likelihood_ratio=outliers.log_likelihood_ratio,
+            parameters=values, per_experiment=effect.per_experiment, shows_in=effect.shows_in,
+        )  # fmt: skip
+
+    def _values(self, term: Term) -> tuple[Value, ...]:
+        estimate = self.identified.plant.estimate
+        plant, (low, high) = estimate.plant, self._intervals
+        parameters = plant.parameters_of(term)
+        if term in plant.per_experiment:
+            values = estimate.local[:, plant.local_index(term)]
+            spread, smallest, largest = np.sqrt(np.mean(values**2)), np.min(np.abs(values)), np.max(np.abs(values))
+            name = f"{parameters[0].name}, rms over experiments"
+            return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
+        part = plant.part_of(term)
+        rows = zip(parameters, estimate.theta[part], low[part], high[part], strict=True)
+        return tuple(Value(p.name, p.unit, float(value), float(a), float(b)) for p, value, a, b in rows)
+
+    def _rivals(self, term: Term, without: Trial) -> list[Rival]:
+        """What could stand in the place of an effect, the nearest first; the other effects stay."""
         rivals = []
-        for here, trials in self.search.rounds:
-            if here.terms or len(trials) < 2:
-                continue
-            rivals = [
-                Rival(
-                    trial.names[-1],
-                    float(1 - trial.blocks.sum() / max(here.blocks.sum(), 1e-300)),
-                    trials[0].score - trial.score,
-                )
-                for trial in trials
-                if not taken & set(trial.names) and not any(replaces(trial.terms[-1], t) for t in self.found.terms)
-            ]
+        for trial in self.selection.compare(without):
+            new = [t for t in trial.terms if t not in without.terms]
+            other = bool(new) and not new[0].replaces(term) and new[0].effect.name != term.effect.name
+            if other and significant(self.selection.baseline, without, trial):
+                behind = self.selection.trial.score - trial.score
+                rivals.append(Rival(new[0].effect, gained(without, trial), behind))
         return rivals
 
-    def channel(self, term: Term, channels: Channels) -> str:
+    def _channel(self, term: Term) -> str:
         """The name of the input or output that an effect sits on; empty for a force."""
         if term.effect.port == "input":
-            return channels.inputs[term.channel].name
-        return channels.outputs[self.outputs[term.channel]].name if term.effect.port == "output" else ""
+            return self.channels.inputs[term.channel].name
+        outputs = self.identified.plant.outputs
+        return self.channels.outputs[outputs[term.channel]].name if term.effect.port == "output" else ""
 
-    def leftover(self) -> Leftover:
-        """What the errors still hold that the input and the motion would predict."""
-        return look_for_more(self.found.estimate, self.search.train)
-
-    def profiles(self, term: Term) -> list[tuple[str, str, tuple[float, ...], tuple[float, ...]]]:
+    def _profiles(self, term: Term) -> tuple[Profile, ...]:
         """2 (log L_max - log L) over values of each parameter, everything else fitted anew."""
-        few = self.machine.records.samples <= ENOUGH
-        estimate, records = (
-            (self.machine.estimate, self.machine.records) if few else (self.found.estimate, self.search.train)
-        )
-        structure = estimate.structure
-        if term not in structure.terms or term in structure.local:
-            return []
-        problem = Problem(structure, records, self.search.base_noise)
-        low, high = self.machine.intervals()
-        n = records.samples * structure.ny
-        drawn = []
-        for i, parameter in zip(
-            range(*structure.term_at(term).indices(structure.size)), structure.parameters_of(term), strict=True
-        ):
-            reach = 0.5 * (high[i] - low[i])
-            if parameter.fixed or not reach > 0:
+        fitted, selection = self.identified.plant, self.selection
+        estimate, records = fitted.estimate, fitted.records
+        if records.samples > ENOUGH:
+            estimate, records = selection.trial.estimate, selection.baseline.train
+        plant = estimate.plant
+        if term not in plant.terms or term in plant.per_experiment:
+            return ()
+        problem = Problem(plant, records, selection.baseline.noise)
+        low, high = self._intervals
+        n = records.samples * plant.ny
+        profiles = []
+        for i, parameter in enumerate(plant.parameters_of(term), start=plant.part_of(term).start):
+            half = 0.5 * (high[i] - low[i])
+            if parameter.fixed or not half > 0:
                 continue
-            fixed = np.arange(structure.size) == i
+            fixed = np.arange(plant.size) == i
             points = [(float(estimate.theta[i]), 0.0)]
             for step in PROFILE:
                 theta = estimate.theta.copy()
-                theta[i] = np.clip(theta[i] + step * reach, parameter.low, parameter.high)
+                theta[i] = np.clip(theta[i] + step * half, parameter.low, parameter.high)
                 fit = problem.fit(theta, estimate.local, fixed=fixed, max_steps=10)
-                points.append((float(theta[i]), n * math.log(fit.squares / estimate.squares)))
-            points.sort()
-            drawn.append(
-                (parameter.name, parameter.unit, tuple(x for x, _ in points), tuple(max(0.0, y) for _, y in points))
-            )
-        return drawn
+                points.append((float(theta[i]), max(0.0, n * math.log(fit.squares / estimate.squares))))
+            values, deviance = zip(*sorted(points), strict=True)
+            profiles.append(Profile(parameter.name, parameter.unit, values, deviance))
+        return tuple(profiles)
+
+
+def gained(smaller: Trial, larger: Trial) -> float:
+    """Return the share of the held-out squared error that the larger model takes away."""
+    return float(1 - larger.blocks.sum() / max(smaller.blocks.sum(), 1e-300))
+
+
+def separation(effect: Effect, other: Effect) -> Separation:
+    """Describe the experiment that would tell two effects apart, as either of them knows it."""
+    experiment = effect.confounders.get(other.name) or other.confounders.get(effect.name)
+    if not experiment:
+        views = " and ".join(dict.fromkeys(effect.shows_in[:1] + other.shows_in[:1]))
+        experiment = f"vary the amplitude and the speed of the input more, and look at the error against {views}"
+    return Separation(other.name, other.title, experiment)
+
+
+def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Compute 95 % intervals of theta, honest for coloured errors and for what the model cannot explain.
+
+    cov = H^-1 (sum over blocks of g g') H^-1, g = J' e of a block (Liang and Zeger 1986); Student's t.
+    """
+    estimate, noise = fitted.estimate, fitted.noise
+    plant, theta = estimate.plant, estimate.theta
+    jacobian = Problem(plant, fitted.records, noise).jacobian(theta, estimate.local, plant.free)
+    white = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
+    normal = NormalEquations.of(jacobian, white)
+    h, weights, _ = normal.reduced(0.0)
+    # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
+    own = jacobian.theta - np.einsum("eqp,qem->pem", weights, jacobian.local)
+    per_record = max(1, -(-BLOCKS // len(white)))
+    parts = np.array_split(own * white, per_record, axis=2)
+    g = np.concatenate([part.sum(axis=2).T for part in parts])  # [blocks, p]
+    inside = plant.free & (np.diag(normal.h) > 0)
+    inverse = np.linalg.pinv(h[np.ix_(inside, inside)], rcond=1e-12, hermitian=True)
+    used = len(g) / max(1, len(g) - 1)
+    covariance = inverse @ (g.T @ g)[np.ix_(inside, inside)] @ inverse * used
+    reach = np.full(len(theta), 0.0)
+    reach[inside] = student.ppf(0.975, max(2, len(g) - 1)) * np.sqrt(np.maximum(np.diag(covariance), 0))
+    return np.maximum(theta - reach, plant.low), np.minimum(theta + reach, plant.high)

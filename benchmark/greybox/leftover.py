@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.fitting import Estimate, Problem, Records, Slopes
-from simgap.greybox.plant import Structure
+from simgap.findings import Offer
+from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.noise import white
+from simgap.greybox.normal_equations import Jacobian
+from simgap.greybox.plant import Plant
+from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
+from simgap.records import Channel
 
 RIDGES = (1e-4, 1e-2, 1.0)
 # Of the share that is predicted, as many standard errors over the folds must be above zero.
 CERTAIN = 2.5
 FOLDS = 8
+# Of the regression that a formula comes from.
+THRESHOLDS = (0.5, 0.3, 0.2, 0.1, 0.05)
+WORSE = 0.05  # of the variance that the fullest formula explains may be lost for a shorter one
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,35 +40,33 @@ class Leftover:
     share: float
 
 
-def look_for_more(found: Estimate, records: Records) -> Leftover:
+def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     """Regress the errors on what forces of many shapes would do to the output, filtered through the linear plant."""
-    structure, problem = found.structure, Problem(found.structure, records, _unit(found.structure.ny))
-    n, order = len(records.u), structure.order
-    states = problem.simulator.states(found.theta[None], found.local[None, :, :order])[0]  # [E, T, n]
-    names, phi = library(structure, states, records.u)
-    plain = Structure(
-        structure.kind, order, len(names), structure.dt, zeros=structure.zeros, two_outputs=structure.two_outputs
-    )
+    plant, problem = estimate.plant, Problem(estimate.plant, records, white(np.ones(estimate.plant.ny)))
+    n, order = len(records.u), plant.order
+    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, :order])[0]  # [E, T, n]
+    names, phi = library(plant, states, records.u)
+    plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs)
     simulator = Simulator(plain, np.ascontiguousarray(phi))
     theta = np.zeros(plain.size)
-    for part in (0, 3, 4):
-        theta[plain.at[part]] = found.theta[structure.at[part]]
+    for part in ("poles", "zeros", "velocity"):
+        theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
     thetas = np.repeat(theta[None], len(names), axis=0)
-    thetas[:, plain.at[1]] = np.eye(len(names))
+    thetas[:, plain.layout.gains] = np.eye(len(names))
     responses = np.moveaxis(simulator.run_many(thetas, np.zeros((len(names), n, order)))[..., 0], 0, 2)  # [E, T, f]
-    slopes = problem.slopes(found.theta, found.local, structure.free)
-    share = _predicted(found, records, responses, slopes)
+    jacobian = problem.jacobian(estimate.theta, estimate.local, plant.free)
+    share = _predicted(estimate, records, responses, jacobian)
     mask = records.mask
-    return Leftover(names, phi[mask], responses[mask], found.errors[..., 0][mask], share)
+    return Leftover(names, phi[mask], responses[mask], estimate.errors[..., 0][mask], share)
 
 
-def library(structure: Structure, states: np.ndarray, u: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+def library(plant: Plant, states: np.ndarray, u: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     """Shapes of a missing force in x, v and the inputs, each scaled to rms 1."""
-    x, v = states[..., 0], states[..., min(1, structure.order - 1)]
+    x, v = states[..., 0], states[..., min(1, plant.order - 1)]
     place, rate = np.std(x) + 1e-300, np.std(v) + 1e-300
     x, v = x / place, v / rate
     shapes = {"x^2": x * x, "x^3": x**3, "v |v|": v * np.abs(v), "sign v": np.tanh(10 * v), "v^3": v**3, "v^2": v * v}
-    if structure.order > 1:
+    if plant.order > 1:
         shapes |= {"x v": x * v, "x^2 v": x * x * v, "x |x|": x * np.abs(x)}
     for i in range(u.shape[2]):
         w = u[..., i] / (np.sqrt(np.mean(u[..., i] ** 2)) + 1e-300)
@@ -73,7 +80,7 @@ def library(structure: Structure, states: np.ndarray, u: np.ndarray) -> tuple[tu
     return tuple(shapes), phi / (np.sqrt(np.mean(phi * phi, axis=(0, 1))) + 1e-300)
 
 
-def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes: Slopes) -> float:
+def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jacobian: Jacobian) -> float:
     """Held-out share, over folds of whole experiments, or of blocks where there are few; 0 when it may be chance."""
     mask = records.mask
     fold = np.zeros(mask.shape, dtype=int)
@@ -81,8 +88,8 @@ def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes:
         fold += np.arange(len(mask))[:, None] % FOLDS
     else:
         fold += (np.arange(mask.shape[1]) * FOLDS // mask.shape[1])[None]
-    fold, e = fold[mask], found.errors[..., 0][mask]
-    of_theta = np.moveaxis(slopes.theta[found.structure.free], 0, 2).reshape(*mask.shape, found.structure.ny, -1)[
+    fold, e = fold[mask], estimate.errors[..., 0][mask]
+    of_theta = np.moveaxis(jacobian.theta[estimate.plant.free], 0, 2).reshape(*mask.shape, estimate.plant.ny, -1)[
         :, :, 0
     ]
     model = of_theta[mask]  # what the model's own parameters would do
@@ -110,7 +117,31 @@ def _predicted(found: Estimate, records: Records, responses: np.ndarray, slopes:
     return best
 
 
-def _unit(ny: int):
-    from simgap.greybox.noise import white
+def formula(leftover: Leftover, channel: Channel) -> Offer:
+    """Find the shortest formula for the missing force that predicts the error nearly as well as the fullest one.
 
-    return white(np.ones(ny))
+    Sequentially thresholded least squares (Brunton, Proctor, Kutz 2016), by pysindy, of the error on what each
+    candidate force would do to the output; x, v and the inputs are in units of their spread.
+    """
+    from pysindy.optimizers import STLSQ
+
+    responses = leftover.effects / (np.sqrt(np.mean(leftover.effects**2, axis=0)) + 1e-300)
+    scale = float(np.std(leftover.errors)) or 1.0
+    target = (leftover.errors / scale)[:, None]
+    tried = []
+    for threshold in THRESHOLDS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            optimizer = STLSQ(threshold=threshold, alpha=1e-3)
+            optimizer.fit(responses, target)
+        coefficients = np.asarray(optimizer.coef_)[0]
+        rest = target[:, 0] - responses @ coefficients
+        tried.append((1 - float(np.mean(rest**2)), coefficients))
+    best = max(share for share, _ in tried)
+    share, coefficients = min(
+        (trial for trial in tried if trial[0] > best - WORSE), key=lambda trial: np.count_nonzero(trial[1])
+    )
+    order = np.argsort(-np.abs(coefficients))
+    largest = np.max(np.abs(coefficients)) or 1.0
+    parts = [f"{coefficients[i] / largest:+.2g} {leftover.names[i]}" for i in order if coefficients[i]]
+    return Offer(channel.name, "force ~ " + " ".join(parts), max(0.0, share), "relative")

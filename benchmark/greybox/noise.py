@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
+
+MAX_ORDER = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +26,7 @@ class Noise:
         return self.polynomials.shape[1] - 1
 
     def whiten(self, e: Float[np.ndarray, "... T ny"]) -> Float[np.ndarray, "... T ny"]:
-        """Errors, or slopes of errors, in units of the white noise; the first samples count for nothing."""
+        """Turn errors, or their slopes, into white noise of variance 1; the first samples count for nothing."""
         if not self.order:
             return e / self.deviations
         white = np.empty_like(e)
@@ -34,12 +37,12 @@ class Noise:
 
 
 def white(deviations: Float[np.ndarray, " ny"]) -> Noise:
-    """No memory."""
+    """Describe noise without memory."""
     return Noise(np.ones((len(deviations), 1)), deviations)
 
 
 def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> Noise:
-    """The noise that errors e would be, by the Yule-Walker equations (Ljung 1999, section 4.2)."""
+    """Estimate the noise that errors e would be, by the Yule-Walker equations (Ljung 1999, section 4.2)."""
     ny = e.shape[2]
     polynomials, deviations = np.zeros((ny, order + 1)), np.ones(ny)
     polynomials[:, 0] = 1.0
@@ -53,8 +56,14 @@ def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], orde
     return Noise(polynomials, deviations)
 
 
+def schwarz_order(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> int:
+    """Choose the memory of errors e by Schwarz' criterion (Schwarz 1978)."""
+    price = 0.5 * e.shape[2] * math.log(int(mask.sum()))
+    return int(np.argmax([log_likelihood(e, mask, order) - order * price for order in range(MAX_ORDER + 1)]))
+
+
 def log_likelihood(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> float:
-    """Log-likelihood of errors e under the noise of that order that suits them best, up to a constant."""
+    """Compute the log-likelihood of errors e under the noise of that order that suits them best, up to a constant."""
     noise = estimate(e, mask, order)
     if not np.isfinite(noise.deviations).all():
         return -np.inf

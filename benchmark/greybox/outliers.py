@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy.lib.stride_tricks import sliding_window_view
 
-from simgap.greybox.fitting import Records
+from simgap.greybox.samples import Records
 
 FAR = 6.0  # robust standard deviations; Gaussian noise goes there twice in 1e9 readings
 FEWEST = 3
@@ -26,7 +27,7 @@ class Outliers:
 
 
 def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
-    """Readings whose error stands out from the median of the five around it.
+    """Flag readings whose error stands out from the median of the five around it.
 
     The errors of a model that is wrong are large for a while; those of a bad reading only once.
     """
@@ -41,10 +42,10 @@ def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> 
     return flags
 
 
-def find(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
-    """The outputs with enough readings that are off: log-likelihood of errors of two sizes against one size."""
+def find_outliers(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
+    """Find outputs with enough readings that are off: log-likelihood of errors of two sizes against one size."""
     flags = flag(errors, mask)
-    found = []
+    outliers = []
     for j in range(errors.shape[2]):
         e, bad = errors[:, :, j][mask], flags[:, :, j][mask]
         count, n = int(bad.sum()), len(e)
@@ -55,11 +56,11 @@ def find(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> 
         ratio = n * np.log(one) - (n - count) * np.log(good / (1 - rate)) - count * np.log(far / rate)
         if ratio > 15:
             share = 1 - float(np.sum(e[~bad] ** 2) / np.sum(e**2))
-            found.append(Outliers(j, rate, float(far), share, float(ratio)))
-    return found
+            outliers.append(Outliers(j, rate, float(far), share, float(ratio)))
+    return outliers
 
 
-def left_out(records: Records, errors: Float[np.ndarray, "E T ny"], found: list[Outliers]) -> Records:
-    """The records without the readings that are off."""
-    flags = flag(errors, records.mask)[:, :, [o.output for o in found]].any(axis=2)
+def without_outliers(records: Records, errors: Float[np.ndarray, "E T ny"], outliers: Sequence[Outliers]) -> Records:
+    """Mask the readings that are off."""
+    flags = flag(errors, records.mask)[:, :, [o.output for o in outliers]].any(axis=2)
     return replace(records, mask=records.mask & ~flags)

@@ -10,34 +10,35 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, Scene, Start
-from simgap.records import Kind
+from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
+from simgap.records import Channels, Kind
 
-# Where two input effects, or two output effects, meet: the order in which a signal passes them.
-INPUT_CHAIN = (
-    "input_delay", "gain_fade", "asymmetric_gain", "dead_zone", "input_saturation", "backlash", "actuator_lag",
-)  # fmt: skip
-OUTPUT_CHAIN = ("sensor_lag", "absolute_sensor", "sensor_saturation", "quantisation", "outliers")
-# Added to the reading of one experiment: time to this power.
-LOCAL_POWERS = {"sensor_bias": 0, "sensor_drift": 1}
+
+def plants_of(channels: Channels) -> list[tuple[int, ...]]:
+    """List the outputs of each plant: a position with its velocity, where there is one of each; else each alone."""
+    kinds = [channel.kind for channel in channels.outputs]
+    if kinds.count("position") == 1 and kinds.count("velocity") == 1:
+        pair = (kinds.index("position"), kinds.index("velocity"))
+        return [pair] + [(i,) for i in range(len(kinds)) if i not in pair]
+    return [(i,) for i in range(len(kinds))]
 
 
 @dataclass(frozen=True, eq=False)
-class Scenes:
-    """The sizes that each input sees, and each output; forces see those of the first of both."""
+class PlantScales:
+    """Signal scales at each input and at each output; forces see those of the first of both."""
 
-    inputs: tuple[Scene, ...]
-    outputs: tuple[Scene, ...]
+    inputs: tuple[SignalScales, ...]
+    outputs: tuple[SignalScales, ...]
 
-    def of(self, term: Term) -> Scene:
-        """What a term sees."""
+    def of(self, term: Term) -> SignalScales:
+        """Return the scales where a term acts."""
         port = term.effect.port
         return self.inputs[term.channel] if port == "input" else self.outputs[term.channel if port == "output" else 0]
 
 
 @dataclass(frozen=True)
 class Term:
-    """An effect at its place: on which input, or on which output."""
+    """An effect where it acts: on which input, or on which output."""
 
     effect: Effect
     channel: int = 0
@@ -47,10 +48,26 @@ class Term:
         """Name and channel; a model has each term once."""
         return self.effect.name, self.channel
 
+    def replaces(self, other: Term) -> bool:
+        """Tell whether this effect contains the other one as a special case."""
+        return other.effect.name in self.effect.contains
+
 
 @dataclass(frozen=True)
-class Structure:
-    """A plant of given order with its terms; theta is shape, gains, offset, zeros, velocity scale, then the terms.
+class Layout:
+    """Where each part of theta stands. poles: coefficients of the sections of A; gains: of each input and tap."""
+
+    poles: slice
+    gains: slice
+    offset: slice
+    zeros: slice
+    velocity: slice  # the scale of a second output that measures the velocity
+    terms: tuple[slice, ...]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A linear plant of given order with the effects on it.
 
     Companion form (all kinds but level), z = (x, x', ..), the product of sections s^2 + a1 s + a0 and s + a:
 
@@ -70,96 +87,89 @@ class Structure:
     # just that one; the mean of one that runs on smoothly to the next sample is a combination of those around it.
     # None comes later than the end of the interval, where the next output is read.
     taps: tuple[int, ...] = (0,)
-    scenes: Scenes = None  # type: ignore[assignment]  # needed as soon as there are terms
+    scales: PlantScales | None = None  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
 
     @property
     def ny(self) -> int:
-        """Outputs."""
+        """Number of outputs."""
         return 1 + self.two_outputs
 
     @property
-    def signless(self) -> bool:
+    def sign_hidden(self) -> bool:
         """Whether a reading does not tell on which side of zero it is."""
-        return any(term.effect.name == "absolute_sensor" for term in self.terms)
+        return any(term.effect.hides_sign for term in self.terms)
 
     @property
     def cascade(self) -> bool:
         """Whether the states are the levels of tanks in a row."""
         return self.kind == "level"
 
-    def having(self, terms: Sequence[Term]) -> Structure:
-        """The same plant with these terms, in the order in which signals pass them."""
-        rank = {name: i for i, name in enumerate((*INPUT_CHAIN, *OUTPUT_CHAIN))}
-        return replace(self, terms=tuple(sorted(terms, key=lambda term: (rank.get(term.effect.name, 99), term.key))))
+    def having(self, terms: Sequence[Term]) -> Plant:
+        """Return the same plant with these terms, in the order in which signals pass them."""
+        return replace(self, terms=tuple(sorted(terms, key=lambda term: (term.effect.place_in_chain, term.key))))
+
+    # ------------------------------------------------------------------ parameters
 
     @cached_property
-    def widths(self) -> tuple[int, ...]:
-        """Sizes of the parts of theta."""
-        plant = (self.order, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs))
-        return plant + tuple(0 if t in self.local else len(self.parameters_of(t)) for t in self.terms)
-
-    @cached_property
-    def at(self) -> tuple[slice, ...]:
-        """The parts of theta: shape, gains, offset, zeros, velocity scale, then one for each term."""
-        ends = tuple(accumulate(self.widths))
-        return tuple(slice(end - width, end) for width, end in zip(self.widths, ends, strict=True))
+    def layout(self) -> Layout:
+        """Where each part of theta stands."""
+        widths = [self.order, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs)]
+        widths += [0 if t in self.per_experiment else len(self.parameters_of(t)) for t in self.terms]
+        slices = [slice(end - width, end) for width, end in zip(widths, accumulate(widths), strict=True)]
+        return Layout(*slices[:5], terms=tuple(slices[5:]))
 
     @property
-    def n_plant(self) -> int:
-        """Parameters of the plant without its terms."""
-        return sum(self.widths[:5])
+    def n_linear(self) -> int:
+        """Parameters of the linear plant, without its terms."""
+        return self.layout.velocity.stop
 
     @property
     def size(self) -> int:
         """Length of theta."""
-        return sum(self.widths)
+        return self.layout.terms[-1].stop if self.terms else self.n_linear
 
     def parameters_of(self, term: Term) -> tuple[Parameter, ...]:
-        """The parameters of a term, with bounds."""
-        return term.effect.parameters(self.scenes.of(term))
+        """List the parameters of a term, with bounds."""
+        assert self.scales is not None
+        return term.effect.parameters(self.scales.of(term))
 
     def starts_of(self, term: Term) -> list[Start]:
-        """Where a search for a term may begin."""
-        return term.effect.starts(self.scenes.of(term))
+        """List the points from which a fit of a term begins."""
+        assert self.scales is not None
+        return term.effect.starts(self.scales.of(term))
 
-    def term_at(self, term: Term) -> slice:
-        """Where the parameters of a term stand in theta."""
-        return self.at[5 + self.terms.index(term)]
+    def part_of(self, term: Term) -> slice:
+        """Return where the parameters of a term stand in theta."""
+        return self.layout.terms[self.terms.index(term)]
 
     @cached_property
-    def local(self) -> tuple[Term, ...]:
+    def per_experiment(self) -> tuple[Term, ...]:
         """Terms whose parameters are estimated anew in every experiment."""
-        return tuple(term for term in self.terms if term.effect.name in LOCAL_POWERS)
+        return tuple(term for term in self.terms if term.effect.time_power is not None)
 
     @property
     def n_local(self) -> int:
-        """Numbers estimated in every experiment: the start state, then one for each local term."""
-        return self.order + len(self.local)
+        """Numbers estimated in every experiment: the initial state, then one for each term of its own."""
+        return self.order + len(self.per_experiment)
 
-    def on(self, port: str, channel: int = 0) -> list[Term]:
-        """The terms of a port, on one channel where it has several, in their order."""
-        return [t for t in self.terms if t.effect.port == port and (port == "force" or t.channel == channel)]
-
-    @cached_property
-    def substeps(self) -> int:
-        """Substeps a sample: what the most demanding term asks for."""
-        return max((term.effect.substeps for term in self.terms), default=1)
+    def local_index(self, term: Term) -> int:
+        """Return where the parameter of a per-experiment term stands among the numbers of an experiment."""
+        return self.order + self.per_experiment.index(term)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All of theta with bounds; those of the plant only as far as stability needs them."""
+        """All of theta with bounds; those of the linear plant only as far as stability needs them."""
         inf = float("inf")
         # A tank that is much faster than the sampling is no tank.
-        plant = [Parameter(f"a{i}", "", 0.0, 5 / self.dt if self.cascade else inf) for i in range(self.order)]
-        plant += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.widths[1])]
-        plant += [Parameter("d", "", -inf, inf)] * self.offset
-        plant += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
-        plant += [Parameter("g", "", -inf, inf)] * self.two_outputs
-        for term in self.terms:
-            if term not in self.local:
-                plant += self.parameters_of(term)
-        return tuple(plant)
+        fastest = 5 / self.dt if self.cascade else inf
+        linear = [Parameter(f"a{i}", "", 0.0, fastest) for i in range(self.order)]
+        linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]
+        linear += [Parameter("d", "", -inf, inf)] * self.offset
+        linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
+        linear += [Parameter("g", "", -inf, inf)] * self.two_outputs
+        of_terms = [p for t in self.terms if t not in self.per_experiment for p in self.parameters_of(t)]
+        return (*linear, *of_terms)
 
     @property
     def low(self) -> Float[np.ndarray, " p"]:
@@ -177,38 +187,67 @@ class Structure:
         return np.array([not parameter.fixed for parameter in self.parameters], dtype=bool)
 
     @cached_property
-    def acting(self) -> Bool[np.ndarray, " p"]:
+    def moves_states(self) -> Bool[np.ndarray, " p"]:
         """Which of theta the states depend on: not what only the readings do."""
-        acting = np.ones(self.size, dtype=bool)
-        for part in (*self.at[3:5], *(self.term_at(term) for term in self.terms if term.effect.port == "output")):
-            acting[part] = False
-        return acting
+        moves = np.ones(self.size, dtype=bool)
+        readings = [self.part_of(term) for term in self.terms if term.effect.port == "output"]
+        for part in (self.layout.zeros, self.layout.velocity, *readings):
+            moves[part] = False
+        return moves
+
+    def carry(
+        self, smaller: Plant, theta: np.ndarray, local: np.ndarray
+    ) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "E q"]]:
+        """Return theta and the per-experiment numbers of another choice of terms in this plant's layout; else zero."""
+        carried = np.zeros(self.size)
+        carried[: self.n_linear] = theta[: self.n_linear]
+        numbers = np.zeros((len(local), self.n_local))
+        numbers[:, : self.order] = local[:, : self.order]
+        for term in self.terms:
+            if term not in smaller.terms:
+                continue
+            if term in self.per_experiment:
+                numbers[:, self.local_index(term)] = local[:, smaller.local_index(term)]
+            else:
+                carried[self.part_of(term)] = theta[smaller.part_of(term)]
+        return carried, numbers
+
+    # ------------------------------------------------------------------ dynamics
+
+    def on(self, port: str, channel: int = 0) -> list[Term]:
+        """List the terms of a port, on one channel where it has several, in their order."""
+        return [t for t in self.terms if t.effect.port == port and (port == "force" or t.channel == channel)]
+
+    @cached_property
+    def substeps(self) -> int:
+        """Substeps per sample: what the most demanding term asks for."""
+        return max((term.effect.substeps for term in self.terms), default=1)
 
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
-        """A of z' = A z + (inputs and forces)."""
-        shape, n = theta[self.at[0]], self.order
+        """Return A of z' = A z + (inputs and forces)."""
+        sections, n = theta[self.layout.poles], self.order
         if self.cascade:
-            return np.diag(-shape) + np.diag(shape[:-1], -1)
+            return np.diag(-sections) + np.diag(sections[:-1], -1)
         polynomial = np.ones(1)
         for first in range(0, n, 2):
-            section = [1.0, *shape[first : first + 2]]
-            polynomial = np.convolve(polynomial, section)
+            polynomial = np.convolve(polynomial, [1.0, *sections[first : first + 2]])
         a = np.diag(np.ones(n - 1), 1)
         a[-1] = -polynomial[:0:-1]
         return a
 
     def reading(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "ny n"]:
-        """C of y = C z, before the sensors' effects."""
+        """Return C of y = C z, before the sensors' effects."""
         c = np.zeros((self.ny, self.order))
         if self.cascade:
             c[0, -1] = 1.0
             return c
         c[0, 0] = 1.0
-        c[0, 1 : 1 + self.zeros] = theta[self.at[3]]
+        c[0, 1 : 1 + self.zeros] = theta[self.layout.zeros]
         if self.two_outputs:
-            c[1, 1] = theta[self.at[4]][0]
+            c[1, 1] = theta[self.layout.velocity][0]
         return c
 
+    @property
     def forces(self) -> list[Term]:
         """The terms that act in the plant."""
         return [term for term in self.terms if isinstance(term.effect, ForceEffect)]

@@ -1,4 +1,4 @@
-"""Sizes of a machine's signals, from the data and a first linear model."""
+"""Scales of a plant's signals, from the data and a first linear model."""
 
 from __future__ import annotations
 
@@ -7,57 +7,59 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.effects.effect import Scene
-from simgap.greybox.fitting import Estimate, Problem, Records
-from simgap.greybox.plant import Scenes
+from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.plant import PlantScales
+from simgap.greybox.samples import Records
 from simgap.records import Channels
 
-LINES = 3
+MAX_LINES = 3
 # Two neighbouring readings are taken to lie on one grid when this share of all steps are whole multiples of it.
 ON_GRID = 0.999
 
 
-def scenes_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> Scenes:
-    """What the effects need to know to choose bounds and starts, for each input and each of the plant's outputs."""
-    structure, records = estimate.structure, problem.records
-    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, : structure.order])[0][
+def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> PlantScales:
+    """Measure the scales that effects choose bounds and starts by, for each input and each of the plant's outputs."""
+    plant, records = estimate.plant, problem.records
+    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, : plant.order])[0][
         records.mask
     ]  # [N, n]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
-    place = float(np.max(np.abs(states[:, -1 if structure.cascade else 0])))
-    rate = float(np.max(np.abs(states[:, min(1, structure.order - 1)])))
+    x_max = float(np.max(np.abs(states[:, -1 if plant.cascade else 0])))
+    v_max = float(np.max(np.abs(states[:, min(1, plant.order - 1)])))
 
-    def scene(i: int, j: int) -> Scene:
+    def scales(i: int, j: int) -> SignalScales:
         u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
-        return Scene(
-            kind=structure.kind, order=structure.order, dt=structure.dt, duration=records.duration,
+        return SignalScales(
+            kind=plant.kind, order=plant.order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
-            place=place or 1.0, rate=rate or 1.0, travel=_travel(structure.order, place, rate, records, states),
-            force=float(np.std(drive)) or 1.0, u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
-            frequencies=lines(estimate.errors[:, :, 0], records.dt), lattice=lattice(records.y[:, :, j]),
+            x_max=x_max or 1.0, v_max=v_max or 1.0, stroke=_stroke(plant.order, x_max, v_max, records, states),
+            force_rms=float(np.std(drive)) or 1.0,
+            u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
+            lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
-    return Scenes(tuple(scene(i, 0) for i in range(structure.nu)), tuple(scene(0, j) for j in range(structure.ny)))
+    return PlantScales(tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny)))
 
 
-def _travel(order: int, place: float, rate: float, records: Records, states: np.ndarray) -> float:
+def _stroke(order: int, x_max: float, v_max: float, records: Records, states: np.ndarray) -> float:
     if order > 1:
-        return place or 1.0
+        return x_max or 1.0
     # Where only a velocity is measured: its integral between two changes of sign, at most.
     crossings = np.flatnonzero(np.diff(np.sign(states[:, 0])) != 0)
     longest = np.max(np.diff(crossings), initial=10)
-    return (rate or 1.0) * records.dt * float(min(longest, 200)) * 0.5
+    return (v_max or 1.0) * records.dt * float(min(longest, 200)) * 0.5
 
 
 def lines(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:
-    """Frequencies in Hz at which the errors of all experiments agree in amplitude and phase."""
+    """Find the frequencies in Hz at which the errors of all experiments agree in amplitude and phase."""
     n = 1 << int(np.ceil(np.log2(4 * e.shape[1])))
     power = np.abs(np.fft.rfft(e.sum(0), n)) ** 2
     frequencies = np.fft.rfftfreq(n, dt)
     power[frequencies < 0.7 / (dt * e.shape[1])] = 0.0
     found: list[float] = []
-    for _ in range(LINES):
+    for _ in range(MAX_LINES):
         peak = int(np.argmax(power))
         if power[peak] <= 0:
             break
@@ -66,8 +68,8 @@ def lines(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:
     return tuple(found)
 
 
-def lattice(y: Float[np.ndarray, "E T"]) -> float:
-    """The step of the grid that all readings lie on; 0 when they do not, or when it is too fine to matter."""
+def quantisation_step(y: Float[np.ndarray, "E T"]) -> float:
+    """Find the step of the grid that all readings lie on; 0 when they do not, or when it is too fine to matter."""
     values = np.unique(y)
     if len(values) < 3:
         return 0.0

@@ -12,44 +12,44 @@ from numba import cfunc
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect
 from simgap.greybox.kernels import SLOTS, TERM, run_plant_directly, transition
-from simgap.greybox.plant import LOCAL_POWERS, Structure
+from simgap.greybox.plant import Plant
 
 ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3}
 
 
 @cache
 def compiled(term: Any) -> Any:
-    """A force term for the inner loop."""
+    """Compile a force term for the inner loop."""
     return cfunc(TERM, cache=True)(inspect.unwrap(term))
 
 
 def nothing(x, v, t, h, p, i, m, j):
-    """Fills the unused slots."""
+    """Fill a slot that is not used."""
     return 0.0
 
 
 def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
-    """u some steps later (or, negative, before), standing still outside the record."""
+    """Shift u to some steps later (or, negative, earlier), standing still outside the record."""
     if steps > 0:
         return np.concatenate((u[:, steps:], np.repeat(u[:, -1:], steps, axis=1)), axis=1)
     return np.concatenate((np.repeat(u[:, :1], -steps, axis=1), u[:, :steps]), axis=1) if steps else u
 
 
 class Simulator:
-    """One structure on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller."""
+    """One plant on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller."""
 
-    def __init__(self, structure: Structure, u: Float[np.ndarray, "E T nu"]) -> None:
-        self.structure = structure
-        self.substeps = structure.substeps
-        self.h = structure.dt / self.substeps
-        self.t = structure.dt * np.arange(u.shape[1])  # [T]
+    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"]) -> None:
+        self.plant = plant
+        self.substeps = plant.substeps
+        self.h = plant.dt / self.substeps
+        self.t = plant.dt * np.arange(u.shape[1])  # [T]
         self.shape = u.shape
         # [nu, E, T * substeps]: each sample until the next one
-        arrived = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)
-        self._u = np.ascontiguousarray(arrived)
-        self._arrived: dict[bytes, np.ndarray] = {}
+        arriving = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)
+        self._u = np.ascontiguousarray(arriving)
+        self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
-        forces = structure.forces()
+        forces = plant.forces
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
         acting: list[Any] = [term.effect for term in forces]
@@ -57,7 +57,7 @@ class Simulator:
         self._terms = tuple(compiled(effect.term) for effect in acting) + (compiled(nothing),) * unused
         self._n_terms = len(forces)
         self._roles = np.array([ROLES[effect.role] for effect in acting] + [0] * unused)
-        self._p_at = np.array([structure.term_at(term).start for term in forces] + [0] * unused)
+        self._p_at = np.array([plant.part_of(term).start for term in forces] + [0] * unused)
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory[:-1], *([0] * unused)])
         self._memory = np.zeros(max(1, int(memory[-1])))
@@ -65,21 +65,21 @@ class Simulator:
     def states(
         self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E n"]
     ) -> Float[np.ndarray, "S E T n"]:
-        """The states of the plant at the samples, the first being the start, for each of several thetas."""
-        structure, (experiments, samples, _) = self.structure, self.shape
-        n, s = structure.order, len(thetas)
+        """Simulate the states at the samples, the first being the start, for each of several thetas."""
+        plant, (experiments, samples, _) = self.plant, self.shape
+        n, s = plant.order, len(thetas)
         e, g0, g1 = np.empty((3, s, n, n))
         rates = np.empty((s, n))
         for i, theta in enumerate(thetas):
             # A parameter of an effect leaves the plant as it is.
-            if i and (theta[: structure.n_plant] == thetas[i - 1][: structure.n_plant]).all():
+            if i and (theta[: plant.n_linear] == thetas[i - 1][: plant.n_linear]).all():
                 e[i], g0[i], g1[i], rates[i] = e[i - 1], g0[i - 1], g1[i - 1], rates[i - 1]
                 continue
-            a = structure.matrix(theta)
+            a = plant.matrix(theta)
             transition(a, self.h, e[i], g0[i], g1[i])
             rates[i] = -np.diag(a)
         states = np.empty((s, experiments, samples, n))
-        entry, fast = (0, 0) if structure.cascade else (n - 1, min(1, n - 1))
+        entry, fast = (0, 0) if plant.cascade else (n - 1, min(1, n - 1))
         run_plant_directly(
             e, g0, g1, rates, entry, fast, np.stack([self.drive(theta) for theta in thetas]),
             np.ascontiguousarray(starts), self.substeps, self.h, self._terms, self._n_terms, self._roles,
@@ -88,66 +88,65 @@ class Simulator:
         return states
 
     def drive(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
-        """b u + d after the actuators' effects, for every substep."""
-        structure = self.structure
-        gains, offset = theta[structure.at[1]], theta[structure.at[2]]
+        """Compute b u + d after the actuators' effects, for every substep."""
+        plant = self.plant
+        gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
         total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
-        for channel, of_channel in enumerate(gains.reshape(structure.nu, -1)):
-            arrived = self.arrived(theta, channel)
-            for tap, gain in zip(structure.taps, of_channel, strict=True):
-                total += gain * shifted(arrived, tap * self.substeps)
+        for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
+            arriving = self.arriving(theta, channel)
+            for tap, gain in zip(plant.taps, of_channel, strict=True):
+                total += gain * shifted(arriving, tap * self.substeps)
         return total
 
-    def arrived(self, theta: Float[np.ndarray, " p"], channel: int) -> Float[np.ndarray, "E K"]:
-        """What arrives at the plant of one input; kept, because most parameters do not change it."""
-        terms = self.structure.on("input", channel)
+    def arriving(self, theta: Float[np.ndarray, " p"], channel: int) -> Float[np.ndarray, "E K"]:
+        """Pass one input through its effects; the answer is kept, because most parameters do not change it."""
+        terms = self.plant.on("input", channel)
         if not terms:
             return self._u[channel]
-        values = [theta[self.structure.term_at(term)] for term in terms]
+        values = [theta[self.plant.part_of(term)] for term in terms]
         key = np.concatenate([[channel], *values]).tobytes()
-        if key not in self._arrived:
+        if key not in self._drives:
             u = self._u[channel]
             for term, p in zip(terms, values, strict=True):
                 assert isinstance(term.effect, InputEffect)
                 u = term.effect.term(u, p, self.h)
-            if len(self._arrived) > 1 + len(values):
-                self._arrived.pop(next(iter(self._arrived)))
-            self._arrived[key] = u
-        return self._arrived[key]
+            if len(self._drives) > 1 + len(values):
+                self._drives.pop(next(iter(self._drives)))
+            self._drives[key] = u
+        return self._drives[key]
 
     def outputs(
         self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], states: Float[np.ndarray, "E T n"]
     ) -> Float[np.ndarray, "E T ny"]:
-        """The readings of the sensors."""
-        structure = self.structure
+        """Read the sensors."""
+        plant = self.plant
         with np.errstate(over="ignore", invalid="ignore"):
-            y = states @ structure.reading(theta).T
-        for channel in range(structure.ny):
-            for term in structure.on("output", channel):
-                if term in structure.local:
-                    power = LOCAL_POWERS[term.effect.name]
-                    value = local[:, structure.order + structure.local.index(term)]
+            y = states @ plant.reading(theta).T
+        for channel in range(plant.ny):
+            for term in plant.on("output", channel):
+                if (power := term.effect.time_power) is not None:
+                    value = local[:, plant.local_index(term)]
                     y[:, :, channel] += value[:, None] * self.t**power
                 else:
                     assert isinstance(term.effect, OutputEffect)
-                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[structure.term_at(term)], self.t)
+                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[plant.part_of(term)], self.t)
         return y
 
     def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
-        """Simulated outputs; local holds the start state and the local parameters of each experiment."""
+        """Simulate the outputs; local holds the initial state and the per-experiment parameters."""
         return self.run_many(theta[None], local[None])[0]
 
     def run_many(
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
     ) -> Float[np.ndarray, "S E T ny"]:
-        """The same for several parameter vectors; those that differ in what only sensors do share their states."""
-        starts = locals_[:, :, : self.structure.order]
-        keys = [t[self.structure.acting].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
+        """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
+        starts = locals_[:, :, : self.plant.order]
+        keys = [t[self.plant.moves_states].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
         new = {key: i for i, key in enumerate(keys) if key not in self._known}
         with np.errstate(over="ignore", invalid="ignore"):
             if new:
                 rows = list(new.values())
                 self._known |= zip(new, self.states(thetas[rows], starts[rows]), strict=True)
             y = [self.outputs(t, q, self._known[key]) for t, q, key in zip(thetas, locals_, keys, strict=True)]
-        self._known = {keys[0]: self._known[keys[0]]}  # a search asks for the slopes where it has just been
+        self._known = {keys[0]: self._known[keys[0]]}  # the Jacobian is asked for where a fit has just been
         return np.stack(y)

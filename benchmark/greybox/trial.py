@@ -1,4 +1,4 @@
-"""One set of effects, fitted and judged."""
+"""One set of effects, fitted and judged: likelihoods, held-out errors, and whether one set is better than another."""
 
 from __future__ import annotations
 
@@ -6,21 +6,38 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
-from simgap.greybox.fitting import Estimate
+from simgap.greybox.baseline import Baseline
+from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.noise import log_likelihood
 from simgap.greybox.plant import Term
+from simgap.greybox.score_test import STARTS, candidates
+
+# The chance, over the whole catalogue, that noise alone passes for an effect.
+FALSE_NAMES = 1e-3
+# What held-out data must add to the log-likelihood: odds of 20 to 1.
+HELD_OUT = 3.0
+# The mean gain of the held-out blocks over its standard error: one in ten by chance.
+CONSISTENT = 1.3
+BLOCKS = 20
+# Share of the squared error that an effect must explain to be worth a name, however certain it is.
+MATTERS = 0.015
+MATTERS_AT_ALL = 0.003  # of what the plain model has
+# Two models whose squared errors differ by less fit alike; then the simpler one is taken.
+ALIKE = 0.005
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One set of terms, fitted: log-likelihoods of training and held-out errors, and the numbers they cost."""
+    """One set of terms, fitted: log-likelihoods of training and held-out errors, and the parameters they cost."""
 
     terms: tuple[Term, ...]
     estimate: Estimate
     train: float
     valid: float
-    k: int  # numbers estimated for all experiments
-    k_train: int  # numbers estimated for single training experiments
+    k: int  # parameters estimated for all experiments
+    k_train: int  # parameters of single training experiments
     k_valid: int
     blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
 
@@ -37,6 +54,55 @@ class Trial:
         return self.train + self.valid - 0.5 * self.k * math.log(n) - 0.5 * (self.k_train + self.k_valid) * per_record
 
 
-def replaces(new: Term, old: Term) -> bool:
-    """Stribeck friction contains Coulomb friction."""
-    return new.effect.name == "stribeck_friction" and old.effect.name == "coulomb_friction"
+def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
+    """Score a fitted model on training and on held-out data, under autoregressive noise of the given order."""
+    plant, valid = estimate.plant, baseline.valid
+    fixed = np.ones(plant.size, dtype=bool)
+    on_valid = Problem(plant, valid, baseline.noise).fit(estimate.theta, fixed=fixed, max_steps=10)
+    squares = np.where(valid.mask[:, :, None], baseline.noise.whiten(on_valid.errors), 0.0) ** 2
+    blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
+    return Trial(
+        plant.terms, estimate,
+        log_likelihood(estimate.errors, baseline.train.mask, noise_order),
+        log_likelihood(on_valid.errors, valid.mask, noise_order),
+        int(plant.free.sum()), len(baseline.train.u) * len(plant.per_experiment),
+        len(valid.u) * len(plant.per_experiment),
+        np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
+    )  # fmt: skip
+
+
+def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
+
+    2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried.
+    """
+    ratio = larger.train - smaller.train
+    extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
+    tried = len(candidates(baseline, smaller.terms)) * STARTS
+    chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
+    gain = smaller.estimate.squares - larger.estimate.squares
+    matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.squares
+    return bool(matters and chance < FALSE_NAMES and holds_out(baseline, smaller, larger))
+
+
+def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether the larger model simulates held-out data better, in most of them."""
+    if larger.k_valid > smaller.k_valid:
+        # Estimated anew there, so the gain must pay for that.
+        price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.mask.shape[1])
+        return larger.valid - smaller.valid - price > HELD_OUT
+    gain = smaller.blocks - larger.blocks
+    return bool(gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain)))
+
+
+def ranked(trials: list[Trial]) -> list[Trial]:
+    """Sort trials, the best first; but of those that fit alike, the one with the fewest parameters."""
+    best_first = sorted(trials, key=lambda trial: -trial.score)
+    if not best_first:
+        return []
+    best = best_first[0]
+    alike = [t for t in best_first if t.estimate.squares < (1 + ALIKE) * best.estimate.squares]
+    simplest = min(alike, key=lambda trial: trial.k + trial.k_train)
+    if simplest.k + simplest.k_train == best.k + best.k_train:
+        return best_first
+    return [simplest, *(trial for trial in best_first if trial is not simplest)]

@@ -7,7 +7,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from simgap.error_views.views import View, views
+from simgap.error_views.views import views
+from simgap.findings import Wrong
 from simgap.records import Channel, Channels, Experiment
 
 N_INIT, DT, HOLD = 5, 0.1, 15
@@ -36,11 +37,11 @@ def runs(error: Error, kind: str = "velocity", n: int = 8, samples: int = 200, s
     return experiments, simulated, Channels((Channel("u", "V"),), (Channel("phi", unit, kind),))
 
 
-def found(*given) -> dict[str, View]:
+def found(*given) -> dict[str, Wrong]:
     return {view.view: view for view in views(*runs(*given), N_INIT)}
 
 
-def real(views_found: dict[str, View]) -> list[str]:
+def real(views_found: dict[str, Wrong]) -> list[str]:
     return [name for name, view in views_found.items() if view.chance < 0.01]
 
 

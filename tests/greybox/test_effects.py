@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simgap.data.simulated.rigs import hide, physical, suitable
-from simgap.greybox.effects.effect import Scene
+from simgap.greybox.effects.effect import SignalScales
 from simgap.registry import EFFECTS, MODELS
 
 CATALOGUE = {
@@ -15,13 +15,13 @@ CATALOGUE = {
 }  # fmt: skip
 
 
-def scene(kind="position", **changes):
+def scales(kind="position", **changes):
     sizes = dict(
         kind=kind, order=2, dt=0.1, duration=30.0, u_low=-2.0, u_high=2.0, u_rms=1.0, y_low=-3.0, y_high=3.0,
-        y_rms=1.0, place=3.0, rate=4.0, travel=3.0, force=5.0, u_unit="V", y_unit="mm", frequencies=(0.5,),
-        lattice=0.1,
+        y_rms=1.0, x_max=3.0, v_max=4.0, stroke=3.0, force_rms=5.0, u_unit="V", y_unit="mm", lines=(0.5,),
+        quantisation_step=0.1,
     )  # fmt: skip
-    return Scene(**(sizes | changes))
+    return SignalScales(**(sizes | changes))
 
 
 def test_the_catalogue_is_complete():
@@ -39,7 +39,7 @@ def test_an_effect_has_texts_that_say_what_it_is_and_where_it_is_described(name)
 
 @pytest.mark.parametrize("name", EFFECTS.names())
 def test_effects_that_may_be_confused_come_with_the_experiment_that_separates_them(name):
-    for other, experiment in EFFECTS[name].twins.items():
+    for other, experiment in EFFECTS[name].confounders.items():
         assert other in CATALOGUE and other != name
         assert len(experiment) > 20
 
@@ -47,7 +47,7 @@ def test_effects_that_may_be_confused_come_with_the_experiment_that_separates_th
 @pytest.mark.parametrize("kind", ["position", "velocity", "level", "other"])
 @pytest.mark.parametrize("name", EFFECTS.names())
 def test_every_start_lies_within_the_bounds(name, kind):
-    effect, here = EFFECTS[name](), scene(kind, order=1 if kind == "velocity" else 2)
+    effect, here = EFFECTS[name](), scales(kind, order=1 if kind == "velocity" else 2)
     parameters = effect.parameters(here)
     for parameter in parameters:
         assert parameter.low <= parameter.high
@@ -68,9 +68,9 @@ def test_every_start_lies_within_the_bounds(name, kind):
     ],
 )
 def test_units_follow_from_what_the_output_measures(kind, unit, order, force, rate):
-    here = scene(kind, order=order, y_unit=unit)
+    here = scales(kind, order=order, y_unit=unit)
     assert here.force_unit == force
-    assert here.rate_unit == rate
+    assert here.velocity_unit == rate
 
 
 # What a rig calls the size of an effect is the first number of the effect, but for these.
@@ -89,14 +89,14 @@ def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
     dataset = hide(rig, {effect: 1.0}, noise=0.0, seed=7)
     model = MODELS["greybox"](effects=(effect,))
     model.fit(dataset.training, 0)
-    machine = model.machines[0]
-    y = machine.records.y[machine.records.mask]
+    fitted = model.plants[0]
+    y = fitted.records.y[fitted.records.mask]
     # A start on the wrong side of zero is not always corrected.
     left = 0.03 if effect == "absolute_sensor" else 0.01
-    assert np.std(machine.estimate.errors) < left * np.std(y)
+    assert np.std(fitted.estimate.errors) < left * np.std(y)
     if effect in NO_SIZE:
         return
-    structure = machine.estimate.structure
-    found = machine.estimate.theta[structure.term_at(structure.terms[0])]
+    plant = fitted.estimate.plant
+    found = fitted.estimate.theta[plant.part_of(plant.terms[0])]
     size = SIZE.get(effect, lambda size, _: size)(physical(rig, {effect: 1.0})[effect], dataset)
     assert abs(found[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -21,25 +21,29 @@ class AbsoluteSensor(OutputEffect):
         "The sensor shows the size but not the direction: a tachometer that counts pulses, a rectifier."
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Coupled electric drives, Uppsala University TR 2017-024"
-    obvious: ClassVar[bool] = True
-    reshapes: ClassVar[bool] = True
+    visible_in_readings: ClassVar[bool] = True
+    moves_poles: ClassVar[bool] = True
+    place_in_chain: ClassVar[int] = 120
+    hides_sign: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "position")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "sensor_saturation": "move slowly through zero: a saturated reading stays there, a rectified one bounces",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """None."""
         return ()
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """The effect is there or it is not."""
         return [Start(())]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where no reading is below zero but for noise, though the input takes both signs."""
         return (
-            scene.y_low > -0.4 * scene.y_high and scene.u_low < -0.2 * scene.u_max and scene.u_high > 0.2 * scene.u_max
+            scales.y_low > -0.4 * scales.y_high
+            and scales.u_low < -0.2 * scales.u_max
+            and scales.u_high > 0.2 * scales.u_max
         )
 
     @staticmethod

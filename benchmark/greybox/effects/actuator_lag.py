@@ -8,7 +8,7 @@ from typing import ClassVar, final
 import numpy as np
 from scipy.signal import lfilter
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -36,8 +36,10 @@ class ActuatorLag(InputEffect):
         "inner loop of a drive."
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
+    place_in_chain: ClassVar[int] = 70
+    linear: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "input_delay": "apply a step and sample fast: a lag starts at once, after a delay nothing moves at first; "
         "a short hold "
         "of the input excites the high frequencies that tell them apart",
@@ -48,13 +50,13 @@ class ActuatorLag(InputEffect):
     }
     substeps: ClassVar[int] = 4
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The time constant."""
-        return (Parameter("time constant", "s", 0.0, 0.25 * scene.duration),)
+        return (Parameter("time constant", "s", 0.0, 0.25 * scales.duration),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From a sample to a good part of the record."""
-        return [Start((n * scene.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scene.dt < 0.2 * scene.duration]
+        return [Start((n * scales.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -23,8 +23,9 @@ class AsymmetricGain(InputEffect):
         "stage, a single-acting brake."
     )
     reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
+    place_in_chain: ClassVar[int] = 30
     shows_in: ClassVar[tuple[str, ...]] = ("input", "sign of velocity")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "constant_load": "let it run without input: a load still moves it; and compare steps up and down of "
         "several sizes: "
         "an unequal gain errs in proportion to the step, a load by the same amount",
@@ -33,17 +34,17 @@ class AsymmetricGain(InputEffect):
         "sensor_bias": "record at rest without input: a bias is still there",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Half the difference of the two gains over their mean."""
         return (Parameter("asymmetry", "", -0.95, 0.95),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Either side stronger."""
         return [Start((0.1,), amplitude=0)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Only where the input takes both signs."""
-        return scene.u_low < 0 < scene.u_high
+        return scales.u_low < 0 < scales.u_high
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -24,8 +24,9 @@ class Backlash(InputEffect):
     reference: ClassVar[str] = (
         "Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002, sec. 2"
     )
+    place_in_chain: ClassVar[int] = 60
     shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "input")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "hysteresis": "trace slow loops of several sizes: play has straight flanks and a flat top, hysteresis is "
         "rounded",
         "input_delay": "repeat a slow triangle at half the speed: a delay keeps its seconds, play keeps its width "
@@ -36,13 +37,13 @@ class Backlash(InputEffect):
         "dead_zone": "reverse the input slowly far from zero: a dead zone acts around zero only",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The whole gap, in units of the input."""
-        return (Parameter("gap", scene.u_unit, 0.0, 0.9 * (scene.u_high - scene.u_low)),)
+        return (Parameter("gap", scales.u_unit, 0.0, 0.9 * (scales.u_high - scales.u_low)),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From a narrow gap to a third of the travel."""
-        return [Start((share * (scene.u_high - scene.u_low),)) for share in (0.04, 0.12, 0.3)]
+        return [Start((share * (scales.u_high - scales.u_low),)) for share in (0.04, 0.12, 0.3)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -20,8 +20,9 @@ class ConstantLoad(ForceEffect):
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 4"
     role: ClassVar[Role] = "force"
+    linear: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("position", "time")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "asymmetric_gain": "let it run without input, and compare steps up and down of several sizes: a load errs "
         "by the same amount each time",
         "sensor_bias": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
@@ -29,17 +30,17 @@ class ConstantLoad(ForceEffect):
         "sensor_drift": "record for longer: a drift goes on growing",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The force."""
-        return (Parameter("force", scene.force_unit, -20 * scene.force, 20 * scene.force),)
+        return (Parameter("force", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Either way."""
-        return [Start((0.1 * scene.force,), amplitude=0)]
+        return [Start((0.1 * scales.force_rms,), amplitude=0)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where the plain model has no free operating point."""
-        return scene.kind in ("position", "velocity")
+        return scales.kind in ("position", "velocity")
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -25,7 +25,7 @@ class CoulombFriction(ForceEffect):
     )
     role: ClassVar[Role] = "friction"
     shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "velocity", "time since reversal")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts "
         "to move",
         "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead "
@@ -35,17 +35,17 @@ class CoulombFriction(ForceEffect):
         "backlash": "stop and start again in the same direction: friction sticks, play is already taken up",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The friction force."""
-        return (Parameter("friction force", scene.force_unit, 0.0, 10 * scene.force),)
+        return (Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From little to what nearly holds the drive."""
-        return [Start((share * scene.force,)) for share in (0.05, 0.2, 0.5)]
+        return [Start((share * scales.force_rms,)) for share in (0.05, 0.2, 0.5)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where something moves."""
-        return scene.kind in MOTION
+        return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -24,8 +24,9 @@ class DeadZone(InputEffect):
     reference: ClassVar[str] = (
         "Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2"
     )
+    place_in_chain: ClassVar[int] = 40
     shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "drive it at constant speed with slowly rising input in one direction only: friction "
         "keeps its "
         "force while it moves, a dead zone acts on the input alone; then brake without input and watch the stop",
@@ -34,13 +35,13 @@ class DeadZone(InputEffect):
         "dead zone",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Half the width of the zone."""
-        return (Parameter("half width", scene.u_unit, 0.0, 0.9 * scene.u_max),)
+        return (Parameter("half width", scales.u_unit, 0.0, 0.9 * scales.u_max),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From a narrow zone to one that swallows half of the input."""
-        return [Start((share * scene.u_max,)) for share in (0.05, 0.15, 0.3, 0.5)]
+        return [Start((share * scales.u_max,)) for share in (0.05, 0.15, 0.3, 0.5)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

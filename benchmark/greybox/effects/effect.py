@@ -18,8 +18,8 @@ Role = Literal["force", "friction", "outflow", "rim"]
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What is known of a machine before an effect is fitted to it: sizes in physical units, from the data."""
+class SignalScales:
+    """Sizes of a plant's signals in physical units, known before an effect is fitted."""
 
     kind: Kind
     order: int
@@ -31,14 +31,14 @@ class Scene:
     y_low: float  # unit of the output, as are the next two
     y_high: float
     y_rms: float
-    place: float  # the largest distance from zero
-    rate: float  # the largest velocity
-    travel: float  # the distance between far reversals
-    force: float  # what the input does, rms, in the unit of the highest derivative
+    x_max: float  # the largest distance from zero
+    v_max: float  # the largest velocity
+    stroke: float  # the distance between far reversals
+    force_rms: float  # what the input does, in the unit of the highest derivative
     u_unit: str = ""
     y_unit: str = ""
-    frequencies: tuple[float, ...] = ()  # Hz, where the error of all experiments has a common line
-    lattice: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
+    lines: tuple[float, ...] = ()  # Hz, frequencies at which the errors of all experiments agree
+    quantisation_step: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
 
     @property
     def u_max(self) -> float:
@@ -67,7 +67,7 @@ class Scene:
         return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
 
     @property
-    def rate_unit(self) -> str:
+    def velocity_unit(self) -> str:
         """Unit of the velocity that the force terms see."""
         return self.unit(1, -1 if self.order > 1 or self.kind == "velocity" else 0)
 
@@ -84,7 +84,7 @@ class Parameter:
 
 
 class Start(NamedTuple):
-    """Where a search may begin. `amplitude` is the parameter that the effect is proportional to, if there is one."""
+    """Where a fit may begin; `amplitude` is the parameter that the effect is proportional to, if there is one."""
 
     values: tuple[float, ...]
     amplitude: int | None = None
@@ -98,35 +98,49 @@ class Effect(ABC):
     explanation: ClassVar[str]
     reference: ClassVar[str]
     port: ClassVar[Port]
-    # The views of what is wrong that show it, most telling first.
+    # The views of the error that show it, most telling first: their names in `simgap.error_views`.
     shows_in: ClassVar[tuple[str, ...]] = ()
-    # Effects that data may not separate from this one, and the experiment that would.
-    twins: ClassVar[dict[str, str]] = {}
+    # Effects that the data may not separate from this one, and the experiment that would.
+    confounders: ClassVar[dict[str, str]] = {}
+    # Simpler effects that this one contains as a special case; it takes their place in a model.
+    contains: ClassVar[tuple[str, ...]] = ()
     # The states that the term carries through a simulation.
     memory: ClassVar[int] = 0
+    # Substeps per sample that the term needs.
+    substeps: ClassVar[int] = 1
+    # Where several effects act on one signal, it passes them in ascending order.
+    place_in_chain: ClassVar[int] = 990
     # Its parameters belong to one experiment and cannot be forecast.
     per_experiment: ClassVar[bool] = False
-    # The linear plant fitted without it has other poles, so that a search with it looks for them anew.
-    reshapes: ClassVar[bool] = False
-    # Readings that suit it are evidence by themselves: it is tried before anything else.
-    obvious: ClassVar[bool] = False
-    # Substeps a sample that its term needs.
-    substeps: ClassVar[int] = 1
+    # Adds value * t^power to the reading, with a value of its own in every experiment; None: no such effect.
+    time_power: ClassVar[int | None] = None
+    # False when it cannot be simulated and is found in the errors instead.
+    simulated: ClassVar[bool] = True
+    # A linear model of higher order would take it up, so it is tried before the nonlinear effects.
+    linear: ClassVar[bool] = False
+    # May explain what otherwise asks for a higher order of the plant.
+    instead_of_order: ClassVar[bool] = False
+    # The linear plant fitted without it has other poles, so that a fit with it searches for the poles anew.
+    moves_poles: ClassVar[bool] = False
+    # The readings alone show it, so that it is tried before anything else.
+    visible_in_readings: ClassVar[bool] = False
+    # A reading does not tell on which side of zero the quantity is.
+    hides_sign: ClassVar[bool] = False
 
     @abstractmethod
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
-        """The parameters with bounds that fit the sizes of the scene."""
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
+        """List the parameters, with bounds in proportion to the signals."""
 
     @abstractmethod
-    def starts(self, scene: Scene) -> list[Start]:
-        """Points to begin a search from."""
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """List the points from which a fit begins."""
 
-    def suits(self, scene: Scene) -> bool:
-        """Whether the effect makes sense on such a machine."""
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the effect makes sense on such a plant."""
         return True
 
     def describe(self, values: dict[str, float]) -> str:
-        """The sentence for an engineer: what was found, with the estimated values."""
+        """Say for an engineer what was found, with the estimated values."""
         return self.explanation
 
 

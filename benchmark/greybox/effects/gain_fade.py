@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -23,18 +23,19 @@ class GainFade(InputEffect):
         "oil that changes with temperature."
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
+    place_in_chain: ClassVar[int] = 20
     shows_in: ClassVar[tuple[str, ...]] = ("first against second half", "time")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record at rest without input: a drift is still there, a fading gain is not",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Share of the gain that is lost per second; negative where it grows."""
-        return (Parameter("loss rate", "1/s", -2.0 / scene.duration, 1.0 / scene.duration),)
+        return (Parameter("loss rate", "1/s", -2.0 / scales.duration, 1.0 / scales.duration),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Either way."""
-        return [Start((0.1 / scene.duration,), amplitude=0)]
+        return [Start((0.1 / scales.duration,), amplitude=0)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

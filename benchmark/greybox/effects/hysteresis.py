@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -23,27 +23,27 @@ class Hysteresis(ForceEffect):
     reference: ClassVar[str] = "Bouc 1967, Wen 1976; Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "sign of velocity")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "backlash": "trace slow loops of several sizes: hysteresis is rounded, play has straight flanks and a flat top",
         "coulomb_friction": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
         "stribeck_friction": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
     }
     memory: ClassVar[int] = 1
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The force after a long travel, and the travel in which it builds up."""
         return (
-            Parameter("force", scene.force_unit, -10 * scene.force, 10 * scene.force),
-            Parameter("travel", scene.unit(1, 0), 0.003 * scene.travel, 2 * scene.travel),
+            Parameter("force", scales.force_unit, -10 * scales.force_rms, 10 * scales.force_rms),
+            Parameter("travel", scales.unit(1, 0), 0.003 * scales.stroke, 2 * scales.stroke),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From a short travel to a long one."""
-        return [Start((0.1 * scene.force, share * scene.travel), amplitude=0) for share in (0.02, 0.07, 0.2, 0.6)]
+        return [Start((0.1 * scales.force_rms, share * scales.stroke), amplitude=0) for share in (0.02, 0.07, 0.2, 0.6)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where something moves."""
-        return scene.kind in MOTION
+        return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

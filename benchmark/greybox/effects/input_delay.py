@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,8 +22,11 @@ class InputDelay(InputEffect):
         "cycle."
     )
     reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
+    place_in_chain: ClassVar[int] = 10
+    linear: ClassVar[bool] = True
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; "
         "a short "
         "hold of the input excites the high frequencies that tell them apart",
@@ -31,13 +34,13 @@ class InputDelay(InputEffect):
     }
     substeps: ClassVar[int] = 4
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The delay."""
-        return (Parameter("delay", "s", 0.0, min(60 * scene.dt, 0.25 * scene.duration)),)
+        return (Parameter("delay", "s", 0.0, min(60 * scales.dt, 0.25 * scales.duration)),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From half a sample to many."""
-        return [Start((n * scene.dt,)) for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scene.dt < 0.2 * scene.duration]
+        return [Start((n * scales.dt,)) for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import InputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -21,8 +21,9 @@ class InputSaturation(InputEffect):
         "Beyond a limit more input brings nothing: the supply voltage, a current limit or the end of a valve's travel."
     )
     reference: ClassVar[str] = "Hippe, Windup in Control, 2006, ch. 1"
+    place_in_chain: ClassVar[int] = 50
     shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "quadratic_drag": "hold constant inputs up to the largest: with saturation the steady output stops growing "
         "at once, "
         "with drag it bends",
@@ -31,13 +32,13 @@ class InputSaturation(InputEffect):
         "input",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The limit, the same both ways."""
-        return (Parameter("limit", scene.u_unit, 0.02 * scene.u_max, scene.u_max),)
+        return (Parameter("limit", scales.u_unit, 0.02 * scales.u_max, scales.u_max),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Limits that are met seldom, and often."""
-        return [Start((share * scene.u_max,)) for share in (0.9, 0.75, 0.55, 0.35)]
+        return [Start((share * scales.u_max,)) for share in (0.9, 0.75, 0.55, 0.35)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -21,18 +21,20 @@ class Outliers(OutputEffect):
         "Single readings are far off and the next one is right again: a loose plug, a lost package, a reflection."
     )
     reference: ClassVar[str] = "Huber and Ronchetti, Robust Statistics, 2009, ch. 1"
+    place_in_chain: ClassVar[int] = 150
+    simulated: ClassVar[bool] = False
     shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
-    twins: ClassVar[dict[str, str]] = {}
+    confounders: ClassVar[dict[str, str]] = {}
     per_experiment: ClassVar[bool] = True
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """How many readings, and how far they are off; estimated from the errors, not by the simulation."""
         return (
             Parameter("share of readings", "", 0.0, 0.2, fixed=True),
-            Parameter("size", scene.y_unit, 0.0, 100 * scene.y_rms, fixed=True),
+            Parameter("size", scales.y_unit, 0.0, 100 * scales.y_rms, fixed=True),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """None: what is an outlier shows in the errors of the rest."""
         return []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,9 +22,10 @@ class Overflow(ForceEffect):
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
     role: ClassVar[Role] = "rim"
-    reshapes: ClassVar[bool] = True
+    moves_poles: ClassVar[bool] = True
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "sensor_saturation": "watch how it comes back from the limit: an overflow leaves it at once, a saturated "
         "sensor only when "
         "the level is back in range",
@@ -33,29 +34,29 @@ class Overflow(ForceEffect):
         "is filled",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The rims of the last tank and of those above it, and the share of a spill that the next tank catches."""
-        last = Parameter("rim", scene.y_unit, 0.3 * scene.y_high, 1.5 * scene.y_high)
-        if scene.order == 1:
+        last = Parameter("rim", scales.y_unit, 0.3 * scales.y_high, 1.5 * scales.y_high)
+        if scales.order == 1:
             return (last,)
         above = Parameter(
-            "rim of the upper tank, as the level it would feed", scene.y_unit, 0.2 * scene.y_high, 3 * scene.y_high
+            "rim of the upper tank, as the level it would feed", scales.y_unit, 0.2 * scales.y_high, 3 * scales.y_high
         )
         return (last, above, Parameter("share caught below", "", 0.0, 1.0))
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Rims that were just met: of the last tank, of the upper one, of both."""
-        met, never = 0.98 * scene.y_high, 1.4 * scene.y_high
-        if scene.order == 1:
+        met, never = 0.98 * scales.y_high, 1.4 * scales.y_high
+        if scales.order == 1:
             return [Start((met,)), Start((0.9 * met,))]
         return [
             Start((last, above, caught))
             for last, above, caught in ((met, 2 * never, 0.5), (never, met, 0.3), (never, met, 0.8), (met, met, 0.8))
         ]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where a level is measured."""
-        return scene.kind == "level" and scene.y_high > 0
+        return scales.kind == "level" and scales.y_high > 0
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -25,24 +25,24 @@ class PeriodicDisturbance(ForceEffect):
     )
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "position_torque": "move at another speed: a disturbance in time keeps its frequency",
         "sensor_drift": "record for longer: a drift does not come back",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Amplitude, frequency, and phase at the start of an experiment."""
         return (
-            Parameter("amplitude", scene.force_unit, -20 * scene.force, 20 * scene.force),
-            Parameter("frequency", "Hz", 0.2 / scene.duration, 0.5 / scene.dt),
+            Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
+            Parameter("frequency", "Hz", 0.2 / scales.duration, 0.5 / scales.dt),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Lines of the error's spectrum that all experiments share, each with two phases."""
         return [
-            Start((0.1 * scene.force, frequency, phase), amplitude=0)
-            for frequency in scene.frequencies
+            Start((0.1 * scales.force_rms, frequency, phase), amplitude=0)
+            for frequency in scales.lines
             for phase in (0.0, 1.57)
         ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -26,32 +26,32 @@ class PositionTorque(ForceEffect):
     )
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("position",)
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "cubic_stiffness": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
         "periodic_disturbance": "move at another speed: a torque over position changes its frequency in time",
         "constant_load": "hold it at several positions: a load is the same at all of them",
         "quadratic_stiffness": "travel further: a torque that repeats over position turns back",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Amplitude, length of one period, and phase at position zero."""
         return (
-            Parameter("amplitude", scene.force_unit, -20 * scene.force, 20 * scene.force),
-            Parameter("period", scene.y_unit, 0.05 * scene.place, 2 * scene.place),
+            Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
+            Parameter("period", scales.y_unit, 0.05 * scales.x_max, 2 * scales.x_max),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Periods from a tenth of the travel to several times its length, each with two phases."""
         return [
-            Start((0.1 * scene.force, length * scene.place, phase), amplitude=0)
+            Start((0.1 * scales.force_rms, length * scales.x_max, phase), amplitude=0)
             for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.5)
             for phase in (0.0, 1.57)
         ]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where a position is known."""
-        return scene.kind == "position" or (scene.kind == "other" and scene.order > 1)
+        return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,7 +22,7 @@ class QuadraticDrag(ForceEffect):
     reference: ClassVar[str] = "Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, ch. 6"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("velocity", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "run at two constant speeds, one twice the other: drag costs four times as much",
         "input_saturation": "hold constant inputs up to the largest: with drag the steady speed bends, with "
         "saturation it stops growing at once",
@@ -30,24 +30,24 @@ class QuadraticDrag(ForceEffect):
         "for a dead zone",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The drag coefficient."""
         return (
             Parameter(
                 "drag",
-                scene.unit(-1, 0 if scene.order > 1 or scene.kind == "velocity" else -1),
+                scales.unit(-1, 0 if scales.order > 1 or scales.kind == "velocity" else -1),
                 0.0,
-                100 * scene.force / scene.rate**2,
+                100 * scales.force_rms / scales.v_max**2,
             ),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """A small drag."""
-        return [Start((0.1 * scene.force / scene.rate**2,), amplitude=0)]
+        return [Start((0.1 * scales.force_rms / scales.v_max**2,), amplitude=0)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where something moves."""
-        return scene.kind in MOTION
+        return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,29 +22,29 @@ class QuadraticStiffness(ForceEffect):
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
     shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "constant_load": "hold it at several positions: a load is the same at all of them",
         "asymmetric_gain": "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The coefficient."""
         return (
             Parameter(
                 "stiffness",
-                scene.unit(-1, -scene.order),
-                -100 * scene.force / scene.place**2,
-                100 * scene.force / scene.place**2,
+                scales.unit(-1, -scales.order),
+                -100 * scales.force_rms / scales.x_max**2,
+                100 * scales.force_rms / scales.x_max**2,
             ),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """A weak spring."""
-        return [Start((0.1 * scene.force / scene.place**2,), amplitude=0)]
+        return [Start((0.1 * scales.force_rms / scales.x_max**2,), amplitude=0)]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where a position is known."""
-        return scene.kind == "position" or (scene.kind == "other" and scene.order > 1)
+        return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

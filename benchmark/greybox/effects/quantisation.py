@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -19,20 +19,21 @@ class Quantisation(OutputEffect):
     title: ClassVar[str] = "quantisation"
     explanation: ClassVar[str] = "The reading comes in steps: few counts of an encoder, few bits of a converter."
     reference: ClassVar[str] = "Widrow and Kollar, Quantization Noise, 2008, ch. 4"
+    place_in_chain: ClassVar[int] = 140
     shows_in: ClassVar[tuple[str, ...]] = ("position",)
-    twins: ClassVar[dict[str, str]] = {}
+    confounders: ClassVar[dict[str, str]] = {}
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The step, as read off the values themselves."""
-        return (Parameter("step", scene.y_unit, scene.lattice, scene.lattice, fixed=True),)
+        return (Parameter("step", scales.y_unit, scales.quantisation_step, scales.quantisation_step, fixed=True),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """The grid of the readings."""
-        return [Start((scene.lattice,))]
+        return [Start((scales.quantisation_step,))]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where the readings lie on a grid."""
-        return scene.lattice > 0
+        return scales.quantisation_step > 0
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,20 +22,21 @@ class SensorBias(OutputEffect):
         "encoder switched on anywhere."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
+    time_power: ClassVar[int | None] = 0
     shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "constant_load": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
         "sensor_drift": "record for longer: a drift goes on growing",
     }
     per_experiment: ClassVar[bool] = True
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The bias."""
-        return (Parameter("bias", scene.y_unit, -10 * scene.y_rms, 10 * scene.y_rms),)
+        return (Parameter("bias", scales.y_unit, -10 * scales.y_rms, 10 * scales.y_rms),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Either way."""
-        return [Start((0.1 * scene.y_rms,), amplitude=0)]
+        return [Start((0.1 * scales.y_rms,), amplitude=0)]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,28 +22,29 @@ class SensorDrift(OutputEffect):
         "creeping load cell."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
+    time_power: ClassVar[int | None] = 1
     shows_in: ClassVar[tuple[str, ...]] = ("time", "first against second half")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "gain_fade": "record at rest without input: a drift is still there",
         "constant_load": "record for longer: a drift goes on growing",
         "sensor_bias": "record for longer: a bias stays as it is",
     }
     per_experiment: ClassVar[bool] = True
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The slope."""
         return (
             Parameter(
                 "slope",
-                scene.y_unit + "/s" if scene.y_unit else "1/s",
-                -10 * scene.y_rms / scene.duration,
-                10 * scene.y_rms / scene.duration,
+                scales.y_unit + "/s" if scales.y_unit else "1/s",
+                -10 * scales.y_rms / scales.duration,
+                10 * scales.y_rms / scales.duration,
             ),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Either way."""
-        return [Start((0.1 * scene.y_rms / scene.duration,), amplitude=0)]
+        return [Start((0.1 * scales.y_rms / scales.duration,), amplitude=0)]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

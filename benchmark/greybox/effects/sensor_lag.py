@@ -7,7 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 from scipy.signal import lfilter
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,20 +22,22 @@ class SensorLag(OutputEffect):
         "The reading follows the quantity like a first-order filter: a thermometer in its sheath, a filtered signal."
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
+    place_in_chain: ClassVar[int] = 110
+    linear: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in "
         "a machine that is otherwise linear: they are the same transfer function",
         "input_delay": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The time constant."""
-        return (Parameter("time constant", "s", 0.0, 0.25 * scene.duration),)
+        return (Parameter("time constant", "s", 0.0, 0.25 * scales.duration),)
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """From a sample to a good part of the record."""
-        return [Start((n * scene.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scene.dt < 0.2 * scene.duration]
+        return [Start((n * scales.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import OutputEffect, Parameter, Scene, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -19,36 +19,37 @@ class SensorSaturation(OutputEffect):
     title: ClassVar[str] = "saturation of the sensor"
     explanation: ClassVar[str] = "Beyond its range the sensor shows its last value while the machine goes on moving."
     reference: ClassVar[str] = "Tao and Kokotovic, 1996, ch. 2"
+    place_in_chain: ClassVar[int] = 130
     shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "input_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
         "overflow": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor "
         "only when the level is back in range",
         "absolute_sensor": "move slowly through zero",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The ends of the range."""
         return (
             Parameter(
                 "lowest reading",
-                scene.y_unit,
-                1.5 * scene.y_low - 0.5 * scene.y_high,
-                0.5 * (scene.y_low + scene.y_high),
+                scales.y_unit,
+                1.5 * scales.y_low - 0.5 * scales.y_high,
+                0.5 * (scales.y_low + scales.y_high),
             ),
             Parameter(
                 "highest reading",
-                scene.y_unit,
-                0.5 * (scene.y_low + scene.y_high),
-                1.5 * scene.y_high - 0.5 * scene.y_low,
+                scales.y_unit,
+                0.5 * (scales.y_low + scales.y_high),
+                1.5 * scales.y_high - 0.5 * scales.y_low,
             ),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Just inside what was read, at either end or both."""
-        span = scene.y_high - scene.y_low
-        inside_low, inside_high = scene.y_low + 0.03 * span, scene.y_high - 0.03 * span
-        beyond_low, beyond_high = scene.y_low - 0.4 * span, scene.y_high + 0.4 * span
+        span = scales.y_high - scales.y_low
+        inside_low, inside_high = scales.y_low + 0.03 * span, scales.y_high - 0.03 * span
+        beyond_low, beyond_high = scales.y_low - 0.4 * span, scales.y_high + 0.4 * span
         return [
             Start(pair) for pair in ((inside_low, inside_high), (inside_low, beyond_high), (beyond_low, inside_high))
         ]

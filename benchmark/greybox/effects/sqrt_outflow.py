@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -21,28 +21,31 @@ class SqrtOutflow(ForceEffect):
     )
     reference: ClassVar[str] = "Torricelli 1643; Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
     role: ClassVar[Role] = "outflow"
-    reshapes: ClassVar[bool] = True
+    moves_poles: ClassVar[bool] = True
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "overflow": "fill it slowly past the largest level: only an overflow stops the rise",
         "sensor_saturation": "empty it through a measured drain: a saturated reading stays while the level falls",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Share of the square root, and the level where both laws agree."""
-        middle = max(0.5 * (scene.y_low + scene.y_high), 0.05 * scene.y_high)
+        middle = max(0.5 * (scales.y_low + scales.y_high), 0.05 * scales.y_high)
         return (
             Parameter("square-root share", "", 0.0, 1.0),
-            Parameter("mid level", scene.y_unit, middle, middle, fixed=True),
+            Parameter("mid level", scales.y_unit, middle, middle, fixed=True),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Weak and strong."""
-        return [Start((share, max(0.5 * (scene.y_low + scene.y_high), 0.05 * scene.y_high))) for share in (0.4, 0.95)]
+        return [
+            Start((share, max(0.5 * (scales.y_low + scales.y_high), 0.05 * scales.y_high))) for share in (0.4, 0.95)
+        ]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where a level is measured."""
-        return scene.kind == "level" and scene.y_high > 0
+        return scales.kind == "level" and scales.y_high > 0
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

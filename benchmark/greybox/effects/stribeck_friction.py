@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Scene, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -22,8 +22,9 @@ class StribeckFriction(ForceEffect):
     )
     reference: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, sec. 2"
     role: ClassVar[Role] = "friction"
+    contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
     shows_in: ClassVar[tuple[str, ...]] = ("velocity", "sign of velocity")
-    twins: ClassVar[dict[str, str]] = {
+    confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "creep through zero very slowly: with Coulomb friction alone the force does not fall "
         "as it starts to move",
         "dead_zone": "drive it at constant speed and change the input a little: a dead zone acts around zero input "
@@ -31,25 +32,25 @@ class StribeckFriction(ForceEffect):
         "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
     }
 
-    def parameters(self, scene: Scene) -> tuple[Parameter, ...]:
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """The friction force in motion, what comes on top at standstill, and the velocity that it falls within."""
         return (
-            Parameter("friction force", scene.force_unit, 0.0, 10 * scene.force),
-            Parameter("rise at standstill", scene.force_unit, 0.0, 10 * scene.force),
-            Parameter("Stribeck velocity", scene.rate_unit, 0.005 * scene.rate, scene.rate),
+            Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),
+            Parameter("rise at standstill", scales.force_unit, 0.0, 10 * scales.force_rms),
+            Parameter("Stribeck velocity", scales.velocity_unit, 0.005 * scales.v_max, scales.v_max),
         )
 
-    def starts(self, scene: Scene) -> list[Start]:
+    def starts(self, scales: SignalScales) -> list[Start]:
         """Several levels and velocities."""
         return [
-            Start((level * scene.force, level * scene.force, share * scene.rate))
+            Start((level * scales.force_rms, level * scales.force_rms, share * scales.v_max))
             for level in (0.1, 0.3)
             for share in (0.03, 0.1, 0.3)
         ]
 
-    def suits(self, scene: Scene) -> bool:
+    def applies_to(self, scales: SignalScales) -> bool:
         """Where something moves."""
-        return scene.kind in MOTION
+        return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

@@ -1,0 +1,60 @@
+"""The plain linear model of one plant with the records it was fitted to: what a selection of effects starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.noise import Noise, white
+from simgap.greybox.outliers import Outliers
+from simgap.greybox.plant import Plant, Term
+from simgap.greybox.samples import Records
+
+MAX_STEPS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A plain linear model, with excerpts of the training and validation records."""
+
+    train: Records
+    valid: Records
+    outputs: tuple[int, ...]  # of the data set
+    estimate: Estimate
+    cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
+    outliers: tuple[Outliers, ...] = ()  # found in the readings, and left out of both records
+
+    @property
+    def plant(self) -> Plant:
+        """The plant without effects."""
+        return self.estimate.plant
+
+    @cached_property
+    def noise(self) -> Noise:
+        """White noise as large as the errors of the plain model; it weighs the outputs against each other."""
+        return white(np.sqrt(np.mean(self.estimate.errors[self.train.mask] ** 2, axis=0)) + 1e-300)
+
+    @cached_property
+    def squares(self) -> float:
+        """Squared errors of the plain model, weighted as those of all other models."""
+        return self.problem(self.plant).squares(self.estimate.errors)
+
+    @property
+    def n_errors(self) -> int:
+        """Number of errors in training: measured samples times outputs."""
+        return self.train.samples * self.plant.ny
+
+    def problem(self, plant: Plant) -> Problem:
+        """Set up the fit of a plant to the training records."""
+        return Problem(plant, self.train, self.noise)
+
+    def fit(
+        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], max_steps: int = MAX_STEPS
+    ) -> Estimate:
+        """Fit a set of terms from several starts and return the best."""
+        problem = self.problem(self.plant.having(terms))
+        return min((problem.fit(*start, max_steps=max_steps) for start in starts), key=lambda fit: fit.squares)

@@ -1,0 +1,57 @@
+"""Normal equations of a fit; the numbers of single experiments are eliminated block by block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobian:
+    """d(simulation)/d(parameter), whitened: of theta [p, E, M], and of the numbers of each experiment [q, E, M]."""
+
+    theta: Float[np.ndarray, "p E M"]
+    local: Float[np.ndarray, "q E M"]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Normal equations of theta, with one block of per-experiment numbers for each experiment."""
+
+    h: Float[np.ndarray, "p p"]
+    gradient: Float[np.ndarray, " p"]
+    cross: Float[np.ndarray, "E p q"]
+    blocks: Float[np.ndarray, "E q q"]
+    block_gradient: Float[np.ndarray, "E q"]
+
+    @classmethod
+    def of(cls, jacobian: Jacobian, white: np.ndarray) -> NormalEquations:
+        j, k = jacobian.theta.swapaxes(0, 1), jacobian.local.swapaxes(0, 1)  # [E, p, M], [E, q, M]
+        jt, kt = j.swapaxes(1, 2), k.swapaxes(1, 2)
+        e = white[:, :, None]
+        return cls((j @ jt).sum(0), (j @ e).sum(0)[:, 0], j @ kt, k @ kt, (k @ e)[:, :, 0])
+
+    def reduced(self, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Eliminate the per-experiment numbers: J' J of theta, and what turns steps of theta into theirs."""
+        blocks = self.blocks.copy()
+        i = np.arange(blocks.shape[1])
+        blocks[:, i, i] = blocks[:, i, i] * (1 + damping) + 1e-12 * np.max(blocks, axis=(1, 2))[:, None] + 1e-300
+        weights = np.linalg.solve(blocks, self.cross.swapaxes(1, 2))  # [E, q, p]
+        starts = np.linalg.solve(blocks, self.block_gradient[:, :, None])[:, :, 0]  # [E, q]
+        h = self.h - (self.cross @ weights).sum(0)
+        return h, weights, starts
+
+    def step(self, inside: np.ndarray, damping: float) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+        """Compute the damped step of theta and of the per-experiment numbers, and the gain it promises."""
+        h, weights, starts = self.reduced(damping)
+        gradient = self.gradient - (self.cross @ starts[:, :, None]).sum(0)[:, 0]
+        scale = np.sqrt(np.maximum(np.diag(self.h), 1e-300))
+        matrix = (h / scale / scale[:, None])[np.ix_(inside, inside)] + (damping + 1e-11) * np.eye(inside.sum())
+        step = np.zeros(len(gradient))
+        if inside.any():
+            step[inside] = np.linalg.lstsq(matrix, (gradient / scale)[inside], rcond=1e-13)[0] / scale[inside]
+        local = starts - weights @ step
+        promised = float(step @ gradient + np.sum(starts * self.block_gradient))
+        return (step, local), promised

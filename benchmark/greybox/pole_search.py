@@ -1,0 +1,103 @@
+"""Fits that begin from a grid of poles: the plain linear model, and models with effects that move the poles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, combinations_with_replacement
+
+import numpy as np
+
+from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.noise import white
+from simgap.greybox.plant import Plant
+from simgap.greybox.samples import Records
+
+FINALISTS = 2
+
+
+def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -> Estimate:
+    """Fit a plain linear model from the best poles of a grid, or from those of a smaller model and one more."""
+    problem = Problem(plant, records, white(np.std(records.y[records.mask], axis=0) + 1e-12))
+    tried = []
+    # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
+    linear = np.zeros(plant.size, dtype=bool)
+    linear[plant.layout.gains] = linear[plant.layout.offset] = True
+    for shape in denominator_grid(plant, records) if smaller is None else larger_denominators(plant, records, smaller):
+        theta = np.zeros(plant.size)
+        theta[plant.layout.poles] = shape
+        theta[plant.layout.velocity] = 1.0
+        solved = problem.fit(theta, fixed=~linear, max_steps=2)
+        tried.append((solved.squares, solved.theta, solved.local))
+    tried.sort(key=lambda trial: trial[0])
+    fits = [problem.fit(theta, local) for _, theta, local in tried[:FINALISTS]]
+    best = min(fits, key=lambda fit: fit.squares)
+    # The outputs are weighed by how well they can be simulated.
+    deviations = np.sqrt(np.mean(best.errors[records.mask] ** 2, axis=0)) + 1e-12
+    return Problem(plant, records, white(deviations)).fit(best.theta, best.local)
+
+
+def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
+    """Fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept."""
+    plant, records = problem.plant, problem.records
+    gains = np.zeros(plant.size, dtype=bool)
+    gains[plant.layout.gains] = gains[plant.layout.offset] = True
+    tried = []
+    few = plant.order <= 2
+    shapes = list(denominator_grid(plant, records, coarse=True)) if few else [
+        [a * scale for a in starts[0][plant.layout.poles]] for scale in (0.25, 0.5, 1.0, 2.0)
+    ]  # fmt: skip
+    for shape in shapes:
+        for start in starts:
+            theta = start.copy()
+            theta[plant.layout.poles] = shape
+            theta[: plant.n_linear] = _same_gain(plant, start, theta)
+            tried.append(problem.fit(theta, fixed=~gains, max_steps=5, tolerance=1.0))
+    tried.sort(key=lambda trial: trial.squares)
+    fits = [problem.fit(trial.theta, trial.local) for trial in tried[:FINALISTS]]
+    best = min(fits, key=lambda fit: fit.squares)
+    return problem.fit(best.theta, best.local) if plant.sign_hidden else best
+
+
+def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Scale the gains so that the steady gain stays what it was with other poles."""
+    ratio = abs(np.linalg.det(plant.matrix(theta)) / (np.linalg.det(plant.matrix(before)) or 1.0))
+    if plant.cascade:  # inflow in units of the last tank
+        ratio = theta[plant.order - 1] / (before[plant.order - 1] or 1.0)
+    theta = theta.copy()
+    theta[plant.layout.gains] = before[plant.layout.gains] * ratio
+    theta[plant.layout.offset] = 0.0
+    return theta[: plant.n_linear]
+
+
+def denominator_grid(plant: Plant, records: Records, coarse: bool = False) -> Iterator[list[float]]:
+    """List section coefficients from the fastest that the sampling shows to the slowest that the records do."""
+    dt, duration = records.dt, records.duration
+    rates = np.geomspace((3 if coarse else 0.5) / duration, (0.3 if coarse else 1.5) / dt, 5 if coarse else 8)
+    if plant.cascade:
+        choose = combinations_with_replacement if coarse else combinations
+        yield from (list(chosen) for chosen in choose(rates[::-1], plant.order))
+    elif plant.order == 1:
+        yield from ([rate] for rate in rates)
+    else:
+        sections = [[2 * damping * w, w * w] for w in np.geomspace(2 / duration, 2.5 / dt, 9)
+                    for damping in (0.05, 0.3, 1.0)]  # fmt: skip
+        sections += [[rate, 0.0] for rate in rates[1::2]]
+        yield from sections
+
+
+def larger_denominators(plant: Plant, records: Records, smaller: Estimate) -> Iterator[list[float]]:
+    """List the poles of a model of lower order with further ones; zeros come after the same poles without them."""
+    before = list(smaller.theta[smaller.plant.layout.poles])
+    rates = np.geomspace(0.5 / records.duration, 1.5 / records.dt, 5)
+    if plant.order == len(before):
+        yield before
+    elif plant.cascade:
+        yield from (sorted([*before, rate], reverse=True) for rate in rates)
+    elif len(before) % 2 == 0:
+        yield from ([*before, rate] for rate in rates)
+    else:
+        # The last first-order section becomes one of second order: with a further real pole, or swinging.
+        rest, last = before[:-1], before[-1]
+        yield from ([*rest, last + rate, last * rate] for rate in rates)
+        yield from ([*rest, 2 * damping * w, w * w] for w in np.geomspace(2 / records.duration, 2.5 / records.dt, 7)
+                    for damping in (0.05, 0.4))  # fmt: skip

@@ -1,0 +1,66 @@
+"""Measured samples as a fit needs them: experiments side by side, and excerpts of long ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from simgap.records import Experiment
+
+# The search uses so many samples, spread over the records; the final fit uses all.
+SEARCH_SAMPLES = 5000
+PIECE = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Experiments side by side; the shorter ones are padded with their last input and masked."""
+
+    u: Float[np.ndarray, "E T nu"]
+    y: Float[np.ndarray, "E T ny"]
+    mask: Bool[np.ndarray, "E T"]
+    dt: float
+
+    @classmethod
+    def of(cls, experiments: Sequence[Experiment], outputs: Sequence[int]) -> Records:
+        """Stack the chosen outputs of these experiments."""
+        longest = max(map(len, experiments))
+
+        def padded(values: np.ndarray) -> np.ndarray:
+            return np.concatenate((values, np.repeat(values[-1:], longest - len(values), axis=0)))
+
+        return cls(
+            np.stack([padded(x.u) for x in experiments]),
+            np.stack([padded(x.y[:, list(outputs)]) for x in experiments]),
+            np.stack([np.arange(longest) < len(x) for x in experiments]),
+            experiments[0].dt,
+        )
+
+    @property
+    def duration(self) -> float:
+        """Duration of the longest experiment, in s."""
+        return self.dt * self.mask.shape[1]
+
+    @property
+    def samples(self) -> int:
+        """Number of measured samples of each output."""
+        return int(self.mask.sum())
+
+    @cached_property
+    def weights(self) -> Float[np.ndarray, "E T 1"]:
+        """1 where something was measured."""
+        return self.mask[:, :, None].astype(float)
+
+
+def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> list[Experiment]:
+    """Cut pieces, evenly spread, out of experiments that are longer than a search needs; else return all of them."""
+    total = sum(map(len, experiments))
+    if total <= 1.5 * samples:
+        return list(experiments)
+    pieces = [x[a : a + PIECE] for x in experiments for a in range(0, max(1, len(x) - PIECE // 2), PIECE)]
+    wanted = max(2, samples * len(pieces) // sum(map(len, pieces)))
+    return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]

@@ -1,0 +1,121 @@
+"""Candidates for the next effect: which apply, what each promises by its score test, and the model with one more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from simgap.greybox.baseline import MAX_STEPS, Baseline
+from simgap.greybox.fitting import Estimate
+from simgap.greybox.normal_equations import Jacobian, NormalEquations
+from simgap.greybox.plant import Plant, Term
+from simgap.greybox.pole_search import refit_from_poles
+from simgap.registry import EFFECTS
+
+# Score tests below this log-likelihood ratio are not worth a refit.
+WORTH_A_REFIT = 2.0
+# Starts of an effect that are refitted: those with the best scores.
+STARTS = 2
+
+
+def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
+    """List every effect that applies to the plant and is not among `terms`, on every channel."""
+    plant, scales = baseline.plant, baseline.plant.scales
+    assert scales is not None
+    taken = {term.key for term in terms}
+    contained = {name for term in terms for name in term.effect.contains}
+    listed = []
+    for name in EFFECTS.names():
+        effect = EFFECTS[name]()
+        if not effect.simulated or name in contained or (effect.time_power is not None and baseline.cut):
+            continue
+        channels = {"input": plant.nu, "force": 1, "output": plant.ny}[effect.port]
+        on_channels = [Term(effect, channel) for channel in range(channels)]
+        listed += [t for t in on_channels if t.key not in taken and effect.applies_to(scales.of(t))]
+    return listed
+
+
+def score(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, jacobian: Jacobian
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Test each start of an effect: the log-likelihood it would gain, to first order, with theta and local numbers.
+
+        d = simulation with the effect - simulation without, made orthogonal to the model's own slopes
+        gain = -N/2 log(1 - (d' e)^2 / (d' d  e' e))
+
+    Where d grows in proportion to a parameter, the start moves to the amplitude that fits best (Rao 1948).
+    """
+    noise = baseline.noise
+    e = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)
+    ee = float(np.vdot(e, e))
+    extended = baseline.problem(plant)
+    without = baseline.problem(estimate.plant).simulator.run(estimate.theta, estimate.local)
+    scored = []
+    for start in plant.starts_of(term):
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        part, amplitude = plant.part_of(term), start.amplitude
+        theta[part] = start.values
+        d = noise.whiten((extended.simulator.run(theta, local) - without) * baseline.train.weights).reshape(e.shape)
+        if not np.isfinite(d).all() or not d.any():
+            scored.append((0.0, theta, local))
+            continue
+        _, projected = NormalEquations.of(jacobian, d).step(estimate.plant.free, 1e-9)
+        dd = float(np.vdot(d, d))
+        rest = max(dd - projected, 1e-6 * dd)
+        along = float(np.vdot(d, e))
+        if along < 0 and amplitude is None:
+            scored.append((0.0, theta, local))
+            continue
+        if amplitude is not None:
+            parameter = plant.parameters_of(term)[amplitude]
+            moved = start.values[amplitude] * along / rest
+            theta[part.start + amplitude] = float(np.clip(moved, parameter.low, parameter.high))
+        ratio = max(1 - along * along / (rest * ee), 1e-12)
+        scored.append((-0.5 * baseline.n_errors * math.log(ratio), theta, local))
+    return scored
+
+
+def extend(
+    baseline: Baseline, estimate: Estimate, term: Term, jacobian: Jacobian | None = None, max_steps: int = MAX_STEPS
+) -> Estimate | None:
+    """Fit the model with one effect more, from the starts with the best scores; None if none is worth it.
+
+    The Jacobian is that of `estimate`; it is computed where it is needed and not given.
+    """
+    plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
+    if term in plant.per_experiment:
+        return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
+    if term.effect.moves_poles:
+        thetas = [theta for theta, _ in started(estimate, plant, term)]
+        return refit_from_poles(baseline.problem(plant), thetas)
+    jacobian = jacobian or jacobian_of(baseline, estimate)
+    scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
+    if not scored or scored[0][0] < WORTH_A_REFIT:
+        return None
+    return baseline.fit(plant.terms, [(theta, local) for _, theta, local in scored[:STARTS]], max_steps)
+
+
+def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
+    """Fit the model with one effect more, whatever the score test says of it."""
+    extended = extend(baseline, estimate, term)
+    if extended is not None:
+        return extended
+    plant = baseline.plant.having([*estimate.plant.terms, term])
+    return baseline.fit(plant.terms, started(estimate, plant, term))
+
+
+def jacobian_of(baseline: Baseline, estimate: Estimate) -> Jacobian:
+    """Differentiate the simulation of a fitted model by its free parameters, on the training records."""
+    return baseline.problem(estimate.plant).jacobian(estimate.theta, estimate.local, estimate.plant.free)
+
+
+def started(estimate: Estimate, plant: Plant, term: Term) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Carry a fitted model over into a larger one, with the new term at each of its starts."""
+    starts = []
+    for start in plant.starts_of(term):
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        theta[plant.part_of(term)] = start.values
+        starts.append((theta, local))
+    return starts
