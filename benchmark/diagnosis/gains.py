@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.findings import Gain
-from simgap.protocol import Model
+from simgap.greybox.model import GreyBoxModel
 from simgap.records import Dataset, Experiment
 
 RESAMPLED = 2000
 BLOCKS = 20  # of a single test experiment
 
 
-def free_run(model: Model, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
     """Simulate rows n_init .. T-1 of one experiment from its first n_init samples."""
     return model.simulate(experiment.u[None], experiment.y[None, :n_init])[0]
 

@@ -1,0 +1,188 @@
+"""Plants, records, noise and fits, without a selection of effects: the lower half of building.py."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from simgap.greybox import initial_states as states
+from simgap.greybox import noise, outliers, signal_scales
+from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.fitting import Problem
+from simgap.greybox.normal_equations import Jacobian, NormalEquations
+from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.samples import Records
+from simgap.records import Channel, Channels, Experiment
+from simgap.registry import EFFECTS
+
+SCALES = SignalScales("position", 2, 0.01, 1.0, -10.0, 10.0, 5.0, -90.0, 90.0, 40.0, 90.0, 200.0, 100.0, 1000.0)
+
+# ------------------------------------------------------------------ records
+
+
+def experiments(u, y, dt, lengths=None):
+    """Experiments of inputs u [E, T] and outputs y [E, T, ny], each cut to its length."""
+    lengths = lengths or [u.shape[1]] * len(u)
+    return [Experiment(f"e{i}", u[i, :n, None], y[i, :n], dt) for i, n in enumerate(lengths)]
+
+
+def channels(kind, ny=1):
+    """One input and one output of that kind, or a position with its velocity."""
+    outputs = (Channel("x", "m", "position"), Channel("v", "m/s", "velocity")) if ny == 2 else (Channel("y", "", kind),)
+    return Channels((Channel("u", "V"),), outputs)
+
+
+def records(u, y, dt, measured=None):
+    """Records side by side: u [E, T], y [E, T, ny], measured [E, T]."""
+    seen = np.ones(u.shape, dtype=bool) if measured is None else measured
+    return Records(np.ascontiguousarray(u[:, :, None]), y, seen, dt)
+
+
+def term(name):
+    """An effect of the catalogue on the first channel."""
+    return Term(EFFECTS[name]())
+
+
+# ------------------------------------------------------------------ noise
+
+
+def noise_of(polynomials, deviations):
+    """Autoregressive noise D(q) e = w for each output, D monic [ny, m], w of these deviations."""
+    return noise.Noise(np.array(polynomials, dtype=float), np.array(deviations, dtype=float))
+
+
+def white_noise(*deviations):
+    """Noise without memory."""
+    return noise.white(np.array(deviations))
+
+
+def whitened(made, e):
+    """Errors e [E, T, ny] in units of the white noise behind them."""
+    return made.whiten(e)
+
+
+def estimated_noise(e, measured, order):
+    """Polynomials [ny, order + 1] and deviations [ny]."""
+    found = noise.estimate(e, measured, order)
+    return found.polynomials, found.deviations
+
+
+def log_likelihood(e, measured, order):
+    """Of errors e [E, T, ny], up to a constant."""
+    return noise.log_likelihood(e, measured, order)
+
+
+def chosen_noise_order(e):
+    """The memory of errors e [E, T, 1] that the search settles on."""
+    return noise.schwarz_order(e, np.ones(e.shape[:2], dtype=bool))
+
+
+# ------------------------------------------------------------------ fitting
+
+
+class Model(NamedTuple):
+    """A plant and its parameters."""
+
+    plant: Plant
+    theta: np.ndarray
+
+    def part(self, number):
+        """Where poles, gains, offset, zeros and the velocity's scale stand in theta, in this order."""
+        layout = self.plant.layout
+        return (layout.poles, layout.gains, layout.offset, layout.zeros, layout.velocity)[number]
+
+
+def model(kind, dt, shape, gain, effects=(), two_outputs=False, offset=None, zeros=()):
+    """A plant with effects, each at its first start."""
+    both = PlantScales((SCALES,), (SCALES, SCALES))
+    plant = Plant(
+        kind, len(shape), 1, dt, zeros=len(zeros), two_outputs=two_outputs, offset=offset is not None, scales=both
+    ).having([term(name) for name in effects])
+    made = Model(plant, np.zeros(plant.size))
+    values = (shape, [gain], [] if offset is None else [offset], zeros, [1.0] * two_outputs)
+    for number, value in enumerate(values):
+        made.theta[made.part(number)] = value
+    for t in plant.terms:
+        if t not in plant.per_experiment:
+            made.theta[plant.part_of(t)] = plant.starts_of(t)[0].values
+    return made
+
+
+def own_numbers(made):
+    """How many numbers every record has for itself: its start, then its sensors' errors."""
+    return made.plant.n_local
+
+
+def outputs_of(made):
+    """How many outputs it has."""
+    return made.plant.ny
+
+
+def signless(made):
+    """Whether readings do not tell on which side of zero they are."""
+    return made.plant.sign_hidden
+
+
+def simulated(made, data, own, theta=None):
+    """Outputs [E, T, ny] from the own numbers [E, q] of each record."""
+    problem = Problem(made.plant, data, noise.white(np.ones(made.plant.ny)))
+    return problem.simulator.run(made.theta if theta is None else theta, own)
+
+
+def jacobian(made, data, own, weighing):
+    """d(whitened simulation) / d(theta) [p, E, M] and / d(own numbers) [q, E, M]."""
+    of = Problem(made.plant, data, weighing).jacobian(made.theta, own, np.ones(len(made.theta), dtype=bool))
+    return of.theta, of.local
+
+
+def step(of_theta, of_own, errors, inside, damping):
+    """The step of theta [p] and of the own numbers [E, q], and the fall of the squares that it promises."""
+    return NormalEquations.of(Jacobian(of_theta, of_own), errors).step(inside, damping)
+
+
+def fitted(made, data, weighing, fixed=None):
+    """Theta and own numbers of a fit that begins at the model's theta."""
+    found = Problem(made.plant, data, weighing).fit(made.theta, fixed=fixed)
+    return found.theta, found.local
+
+
+def own_numbers_of_each(made, data, weighing):
+    """The own numbers of each record, found by a fit of that record alone in which theta is fixed."""
+    alone = [Records(data.u[i : i + 1], data.y[i : i + 1], data.mask[i : i + 1], data.dt) for i in range(len(data.u))]
+    fixed = np.ones(len(made.theta), dtype=bool)
+    return np.concatenate(
+        [Problem(made.plant, one, weighing).fit(made.theta, fixed=fixed, max_steps=15).local for one in alone]
+    )
+
+
+def initial_states(made, data, weighing):
+    """The states [E, q] at the first sample of each record."""
+    return states.initial_states(made.plant, made.theta, data.u, data.y, weighing)
+
+
+# ------------------------------------------------------------------ what is seen before and after a search
+
+
+def outliers_flagged(e, measured):
+    """Which readings [E, T, ny] stand out of their neighbourhood."""
+    return outliers.flag(e, measured)
+
+
+def outliers_found(e, measured):
+    """For each output with outliers: its number, rate, size, share of the squared error, log-likelihood ratio."""
+    return [(f.output, f.rate, f.size, f.share, f.log_likelihood_ratio) for f in outliers.find_outliers(e, measured)]
+
+
+def measured_without_outliers(e, measured):
+    """The mask [E, T] once the outliers of errors e are left out."""
+    data = records(e[:, :, 0], e, 1.0, measured)
+    return outliers.without_outliers(data, e, outliers.find_outliers(e, measured)).mask
+
+
+def lines(e, dt):
+    """Frequencies in Hz that the errors [E, T] of all experiments share."""
+    return signal_scales.lines(e, dt)
+
+
+def lattice(y):
+    """Step of the grid on which all readings [E, T] lie, 0 without one."""
+    return signal_scales.quantisation_step(y)

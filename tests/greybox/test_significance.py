@@ -1,0 +1,145 @@
+"""When a larger model is believed: by likelihood, by what it explains, and by what it forecasts."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from .building import (
+    best_of_round,
+    candidates,
+    chances,
+    cut_in_pieces,
+    names_of,
+    plain_search,
+    ranked,
+    samples_held_out,
+    score_of_trial,
+    significant,
+    trial,
+)
+from .parts import experiments
+from .plants import free_run, steps, velocity
+
+FALSE_NAMES = 1e-3  # the chance, over the whole catalogue, that noise passes for an effect
+LIKELY = 1000.0  # a log-likelihood ratio beyond doubt
+BETTER = np.full(20, 0.5)  # held-out blocks that beat those of a trial, which are 1
+
+
+def searched(load, seed=0):
+    rng = np.random.default_rng(seed)
+    u = steps(rng, (4, 120), low=-0.6)
+    y = free_run(velocity(), u + load, 0.1)[0] + 0.05 * rng.standard_normal((4, 120, 1))
+    made = experiments(u, y, 0.1)
+    return plain_search(made[:3], made[3:], "velocity")
+
+
+@pytest.fixture(scope="module")
+def search():
+    return searched(0.0)
+
+
+@pytest.mark.parametrize("more", [1, 2, 3])
+def test_the_likelihood_must_make_chance_over_all_effects_tried_as_rare_as_promised(search, more):
+    # Bonferroni: FALSE_NAMES over the number of tries is the chance left to one chi-squared of `more` degrees.
+    threshold = 0.5 * chi2.isf(FALSE_NAMES / chances(search), more)
+    smaller = trial(search, parameters=2)
+    for ratio, expected in ((1.001 * threshold, True), (0.999 * threshold, False)):
+        larger = trial(search, squares=0.8, log_likelihood=ratio, parameters=2 + more, held_out=BETTER)
+        assert significant(search, smaller, larger) is expected
+
+
+def test_numbers_of_single_experiments_count_like_parameters_in_training(search):
+    threshold = 0.5 * chi2.isf(FALSE_NAMES / chances(search), 3)
+    for ratio, expected in ((1.001 * threshold, True), (0.999 * threshold, False)):
+        larger = trial(search, squares=0.8, log_likelihood=ratio, own=3, held_out=BETTER)
+        assert significant(search, trial(search), larger) is expected
+
+
+@pytest.mark.parametrize("plain_share", [1.0, 0.5])
+def test_an_effect_must_explain_a_share_of_what_is_there_worth_a_name(search, plain_share):
+    smaller = trial(search, squares=plain_share)
+    for share, expected in ((0.0151, True), (0.0149, False)):
+        larger = trial(search, squares=plain_share * (1 - share), log_likelihood=LIKELY, parameters=2, held_out=BETTER)
+        assert significant(search, smaller, larger) is expected
+
+
+def test_what_is_nothing_beside_the_plain_models_error_is_not_worth_a_name(search):
+    smaller = trial(search, squares=0.05)  # 6.2 % of it are 0.31 % of the plain model's squares, 5.8 % are 0.29 %
+    for share, expected in ((0.062, True), (0.058, False)):
+        larger = trial(search, squares=0.05 * (1 - share), log_likelihood=LIKELY, parameters=2, held_out=BETTER)
+        assert significant(search, smaller, larger) is expected
+
+
+@pytest.mark.parametrize(("swing", "expected"), [(3.4, True), (3.5, False)])
+def test_the_held_out_gain_must_be_consistent_over_the_blocks(search, swing, expected):
+    # Blocks gain 1 + swing and 1 - swing by turns: mean 1, standard error swing / sqrt(20); 1.3 of them is 1 at 3.44.
+    gains = 1 + swing * np.array([1.0, -1.0] * 10)
+    smaller = trial(search, held_out=np.full(20, 9.0))
+    larger = trial(search, squares=0.8, log_likelihood=LIKELY, parameters=2, held_out=9.0 - gains)
+    assert significant(search, smaller, larger) is expected
+
+
+def test_what_simulates_held_out_data_worse_is_not_believed_however_likely(search):
+    larger = trial(search, squares=0.5, log_likelihood=LIKELY, parameters=2, held_out=np.full(20, 1.01))
+    assert not significant(search, trial(search), larger)
+
+
+@pytest.mark.parametrize("more", [1, 4])
+def test_numbers_estimated_anew_from_held_out_data_must_pay_for_themselves_there(search, more):
+    # Each costs half the log of the samples that it is estimated from (Schwarz); odds of 20 to 1 must be left: log 20.
+    price = 0.5 * more * np.log(samples_held_out(search)) + 3.0
+    assert samples_held_out(search) == 120
+    smaller = trial(search, held_out_gain=-50.0)
+    for gain, expected in ((price + 0.01, True), (price - 0.01, False)):
+        larger = trial(search, squares=0.8, log_likelihood=LIKELY, own=3, own_there=more, held_out_gain=gain - 50.0)
+        assert significant(search, smaller, larger) is expected
+
+
+def test_a_trial_is_scored_by_schwarz_with_own_numbers_at_the_price_of_one_record(search):
+    # 3 records of 120 samples in training: log 360 for all, log 120 for those of one record.
+    made = trial(search, log_likelihood=10.0, held_out_gain=4.0, parameters=5, own=3, own_there=1)
+    assert score_of_trial(made) == pytest.approx(14.0 - 2.5 * np.log(360) - 2.0 * np.log(120))
+
+
+def test_of_trials_that_fit_alike_the_simplest_comes_first(search):
+    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6)
+    simple = trial(search, squares=0.502, log_likelihood=90.0, parameters=3)
+    other = trial(search, squares=0.51, log_likelihood=80.0, parameters=2)  # simpler still, but it fits worse
+    assert ranked(search, [other, simple, best]) == [simple, best, other]
+
+
+def test_without_one_that_fits_alike_the_best_score_comes_first(search):
+    worse = trial(search, squares=0.6, log_likelihood=40.0, parameters=2)
+    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6)
+    assert ranked(search, [worse, best]) == [best, worse]
+    assert ranked(search, []) == []
+
+
+def test_a_load_that_is_there_is_found_and_believed():
+    search = searched(0.1)
+    plain, best = best_of_round(search)
+    assert names_of(best) == ("constant_load",)
+    assert significant(search, plain, best)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_where_nothing_is_the_best_of_all_effects_is_not_believed(seed):
+    search = searched(0.0, seed)
+    assert not significant(search, *best_of_round(search))
+
+
+def test_what_is_in_the_model_and_what_it_contains_are_no_candidates(search):
+    assert "dead_zone" in candidates(search)
+    assert "dead_zone" not in candidates(search, "dead_zone")
+    assert "coulomb_friction" in candidates(search, "dead_zone")
+    assert "coulomb_friction" not in candidates(search, "stribeck_friction")
+    assert "outliers" not in candidates(search)  # left out by other means
+
+
+def test_of_pieces_of_experiments_nothing_is_said_that_belongs_to_single_experiments(search):
+    assert {"sensor_bias", "sensor_drift"} <= set(candidates(search))
+    assert not {"sensor_bias", "sensor_drift"} & set(candidates(cut_in_pieces(search)))
+
+
+def test_a_tank_is_not_offered_what_belongs_to_bodies_nor_a_body_what_belongs_to_tanks(search):
+    assert not {"sqrt_outflow", "overflow", "cubic_stiffness"} & set(candidates(search))  # only a velocity is known
