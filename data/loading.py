@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import check_columns
 from simgap.data.formats.folder import experiment_of, load_folder
 from simgap.data.formats.sampling import check_time, sampling_time
-from simgap.data.formats.tables import Table, read_csv
+from simgap.data.formats.tables import Table
 from simgap.data.splits import assemble, split_in_time
 from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
 from simgap.registry import DATASETS

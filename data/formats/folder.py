@@ -7,9 +7,10 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
+from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import FILE, Description, read_description
 from simgap.data.formats.sampling import check_time
-from simgap.data.formats.tables import Table, read_csv
+from simgap.data.formats.tables import Table
 from simgap.data.splits import assemble, hold_out_tails
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 
