@@ -11,7 +11,8 @@ from simgap.error_views import chance
 from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors, View
 from simgap.error_views.variables import bin_values
-from simgap.error_views.wording import amount, between, number, off, percent, rate, span
+from simgap.error_views.wording import between, error, off, rate, span
+from simgap.wording import amount, number, percent
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
 
@@ -45,7 +46,7 @@ def time_since_start(e: Errors) -> Iterator[View]:
     first, last = span(*bins.ends[0]), span(*bins.ends[-1])
     text = (
         f"The simulation of {e.channel.name} is {off(mean[0], unit)} {first} after the start (RMS error "
-        f"{amount(rms[0], unit)}) and {off(mean[-1], unit)} {last} after it (RMS error {amount(rms[-1], unit)}): "
+        f"{error(rms[0], unit)}) and {off(mean[-1], unit)} {last} after it (RMS error {error(rms[-1], unit)}): "
         f"{_squared(share)}."
     )
     yield View("time since the start", e.channel.name, share, p, text, bins.centres, _floats(mean), "s")
@@ -108,11 +109,11 @@ def band(e: Errors) -> Iterator[View]:
     best, share, p = chance.by_bands(power, label)
     edges = np.concatenate([[0.0], OCTAVES])
     low, high = edges[best], edges[best + 1]
-    place = between(low * nyquist, high * nyquist, "Hz") if best else f"below {amount(high * nyquist, 'Hz', 3)}"
+    place = between(low * nyquist, high * nyquist, "Hz") if best else f"below {amount(high * nyquist, 'Hz')}"
     variance = sum(float(part @ part) for part in centred) / len(e.error)
     share = min(1.0, share * variance / float(np.mean(e.error**2)))
     text = (
-        f"The error of {name} is strongest {place} ({number(low)} to {number(high)} of the Nyquist frequency): "
+        f"The error of {name} is strongest {place} ({number(low, 2)} to {number(high, 2)} of the Nyquist frequency): "
         f"{_squared(share)}, beyond what white noise has there."
     )
     filled = np.unique(label)
@@ -142,7 +143,7 @@ def _by_size(
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)
     rms = np.sqrt(squared / count)
     high, low = int(np.argmax(rms)), int(np.argmin(rms))
-    most, least = amount(rms[high], e.channel.unit), amount(rms[low], e.channel.unit)
+    most, least = error(rms[high], e.channel.unit), error(rms[low], e.channel.unit)
     text = (
         f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
         f"those above the average hold {percent(share)} of the squared error beyond their part."
@@ -151,7 +152,7 @@ def _by_size(
 
 
 def _signed(value: float, unit: str) -> str:
-    return ("+" if value > 0 else "") + amount(value, unit)
+    return ("+" if value > 0 else "") + error(value, unit)
 
 
 def _squared(share: float) -> str:

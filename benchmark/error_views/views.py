@@ -18,9 +18,10 @@ from simgap.error_views.variables import (
     by_experiment,
     derivative,
 )
-from simgap.error_views.wording import off, percent, rate
+from simgap.error_views.wording import off, rate
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
+from simgap.wording import percent
 
 __all__ = ["View", "views"]
 

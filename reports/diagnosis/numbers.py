@@ -1,18 +1,11 @@
-"""Numbers of a diagnosis as people read them: no more digits than they deserve, and words for what is no number."""
+"""Estimates, fits and changes of a diagnosis as people read them, and words for what is no number."""
 
 from __future__ import annotations
 
 import math
-import re
 
 from simgap.findings import Value
-
-
-def number(value: float, digits: int = 3) -> str:
-    """0.012345 -> "0.0123", 12345.6 -> "12346": `digits` significant ones, but never rounded before the point."""
-    if not math.isfinite(value) or value == 0:
-        return f"{value:g}"
-    return _fixed(value, max(digits - 1 - _size(value), 0))
+from simgap.wording import number, percent, short_exponent
 
 
 def numbers(value: float, low: float, high: float) -> tuple[str, str, str]:
@@ -27,22 +20,6 @@ def numbers(value: float, low: float, high: float) -> tuple[str, str, str]:
     # A value much smaller than its interval shows two digits too, unless that takes more than two further ones.
     further = max(places, min(1 - _size(value), places + 2)) if value else places
     return _fixed(value, further), _fixed(low, places), _fixed(high, places)
-
-
-def percent(share: float) -> str:
-    """0.613 -> "61 %", 0.9968 -> "99.7 %": what lacks to 100 % shows."""
-    percents = 100 * share
-    if not math.isfinite(percents):
-        return "an unknown share"
-    if 0 < abs(percents) < 1:
-        return "less than 1 %"
-    places = -_size(100 - percents) if 99 < percents < 100 else 0
-    return f"{percents:.{min(max(places, 0), 6)}f} %"
-
-
-def amount(value: float, unit: str, digits: int = 3) -> str:
-    """2.5, "deg" -> "2.5 deg"."""
-    return f"{number(value, digits)} {unit}".rstrip() if math.isfinite(value) else "diverges"
 
 
 def fit(percents: float) -> str:
@@ -94,7 +71,7 @@ def _fixed(value: float, places: int) -> str:
         return "0"
     size = _size(value)
     if not -4 <= size < 6:
-        return re.sub(r"e([+-])0*", r"e\1", f"{value:.{max(size + places, 0)}e}").replace("e+", "e")
+        return short_exponent(f"{value:.{max(size + places, 0)}e}")
     if float(value).is_integer() and abs(value) < 10:
         return f"{value:.0f}"
     return f"{round(value, places):.{max(places, 0)}f}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simgap import wording
 from simgap.findings import Cause, Findings, Wrong
 from simgap.reports.diagnosis import figures, numbers, words
 from simgap.reports.diagnosis.traces import chosen
@@ -52,6 +53,7 @@ def diagnosis_page(findings: Findings) -> str:
     content = {
         "findings": findings,
         "numbers": numbers,
+        "wording": wording,
         "words": words,
         "traces": _traces(findings, plots),
         "causes": [_cause(cause, findings, plots, shown) for cause in findings.causes],

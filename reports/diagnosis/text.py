@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from simgap.findings import Cause, Findings
 from simgap.reports.diagnosis import numbers, words
 from simgap.reports.rendering import printable
+from simgap.wording import amount, percent
 
 VIEWS = 3  # of what is wrong; the page shows all
 
@@ -30,7 +31,7 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         paragraphs += _section("Free-run RMSE on the test experiments", _gain(findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
-        share = f"explains {numbers.percent(offer.explained)} of the squared error of the force, held out"
+        share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
     if findings.causes:
@@ -55,7 +56,7 @@ def _baseline(findings: Findings) -> Iterator[str]:
     yield f"order {words.orders(plain.get('order', 'unknown'))}"
     for name, rmse in plain.get("rmse", {}).items():
         fit = numbers.fit(plain.get("fit_percent", {}).get(name, float("nan")))
-        yield f"{name}: free-run RMSE {numbers.amount(rmse, findings.units.get(name, ''))}, fit {fit}"
+        yield f"{name}: free-run RMSE {amount(rmse, findings.units.get(name, ''))}, fit {fit}"
 
 
 def _wrong(findings: Findings) -> list[str]:
@@ -78,7 +79,7 @@ def _gain(findings: Findings) -> Iterator[str]:
     for name, before in gain.before.items():
         after, unit = gain.after.get(name, float("nan")), findings.units.get(name, "")
         change = numbers.change(before, after)
-        line = f"{name}: {numbers.amount(before, '')} -> {numbers.amount(after, unit)}"
+        line = f"{name}: {amount(before, '')} -> {amount(after, unit)}"
         yield f"{line} ({change})" if change else line
     if findings.left > 0.01:
-        yield f"The input could still predict {numbers.percent(findings.left)} of the plain model's squared error."
+        yield f"The input could still predict {percent(findings.left)} of the plain model's squared error."

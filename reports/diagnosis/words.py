@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from simgap.findings import Cause, Findings, Wrong
-from simgap.reports.diagnosis.numbers import number, percent
+from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
 LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
