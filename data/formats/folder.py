@@ -5,14 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-import numpy as np
-
 from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import FILE, Description, read_description
 from simgap.data.formats.sampling import check_time
-from simgap.data.formats.tables import Table
 from simgap.data.splits import assemble, hold_out_tails
-from simgap.records import Channels, Dataset, Experiment, UnusableInput
+from simgap.records import Dataset, Experiment, UnusableInput
 
 
 def load_folder(folder: Path) -> Dataset:
@@ -32,13 +29,6 @@ def load_folder(folder: Path) -> Dataset:
     return assemble(described.name, splits, described.channels, described.n_init, str(folder))
 
 
-def experiment_of(table: Table, name: str, channels: Channels, dt: float) -> Experiment:
-    """The table's input and output columns as one experiment, sampled every dt seconds."""
-    u = np.column_stack([table.numbers(channel.name) for channel in channels.inputs])  # [T, nu]
-    y = np.column_stack([table.numbers(channel.name) for channel in channels.outputs])  # [T, ny]
-    return Experiment(name, u, y, dt)
-
-
 def natural_order(name: str) -> tuple[list[str | int], str]:
     """Sort key that puts "run_10" after "run_9"; no two names share a key."""
     return [int(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+)", name))], name
@@ -48,7 +38,7 @@ def _experiment(file: Path, name: str, described: Description) -> Experiment:
     table = read_csv(file)
     if described.time is not None:
         check_time(table, described.time, described.sampling_time)
-    return experiment_of(table, name, described.channels, described.sampling_time)
+    return table.experiment(name, described.channels, described.sampling_time)
 
 
 def _matching(folder: Path, split: str, pattern: str) -> list[Path]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.records import LARGEST_VALUE, UnusableInput
+from simgap.records import LARGEST_VALUE, Channels, Experiment, UnusableInput
 
 
 class BadCell(Exception):
@@ -61,3 +61,9 @@ class Table:
             why = f"{values[wrong[0]]} is no measurement; correct it or cut the record before it"
             raise self.refuse(int(wrong[0]), column, why)
         return values
+
+    def experiment(self, name: str, channels: Channels, dt: float) -> Experiment:
+        """Make one experiment, sampled every dt seconds, of the input and output columns."""
+        u = np.column_stack([self.numbers(channel.name) for channel in channels.inputs])  # [T, nu]
+        y = np.column_stack([self.numbers(channel.name) for channel in channels.outputs])  # [T, ny]
+        return Experiment(name, u, y, dt)
