@@ -26,7 +26,7 @@ def load(
     dt: float | None = None,
     name: str | None = None,
 ) -> Dataset:
-    """The data set behind a registered name, a folder with dataset.toml, a CSV file or a pandas DataFrame.
+    """Load a data set: a registered name, a folder with dataset.toml, a CSV file or a pandas DataFrame.
 
     A CSV file and a DataFrame are one record: `inputs` and `outputs` name its columns, the sampling time is
     that of the column "t" or "time" or `dt` in seconds, and the record is split in time 60/20/20.

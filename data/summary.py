@@ -11,7 +11,7 @@ from simgap.records import Channel, Dataset, Experiment
 
 
 def describe(dataset: Dataset) -> dict[str, Any]:
-    """Counts, lengths, sampling time and, for each channel, its spread over the training split.
+    """Sum up counts, lengths, sampling time and, for each channel, its spread over the training split.
 
     The result holds only text, numbers, lists and dicts, so that it can be written as JSON.
     """

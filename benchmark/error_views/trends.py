@@ -11,7 +11,7 @@ from simgap.error_views import chance
 from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors, View
 from simgap.error_views.variables import bin_values
-from simgap.error_views.wording import between, error, off, rate, span
+from simgap.error_views.wording import between, error, mean_error, rate, span
 from simgap.wording import amount, number, percent
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
@@ -27,7 +27,7 @@ def offset(e: Errors) -> Iterator[View]:
         share, p = chance.by_experiments(e.error, e.experiment, np.zeros(n, dtype=int), 0.0)
     else:
         share, p = chance.by_trend(e.error, np.full(len(e.error), mean), 1, 1, e.experiment)
-    text = f"The simulation of {e.channel.name} is {off(mean, e.channel.unit)} on average: {_squared(share)}."
+    text = f"The simulation of {e.channel.name} is {mean_error(mean, e.channel.unit)} on average: {_squared(share)}."
     yield View("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
 
 
@@ -45,8 +45,8 @@ def time_since_start(e: Errors) -> Iterator[View]:
     rms = np.sqrt(np.bincount(bins.labels, e.error**2) / np.bincount(bins.labels))
     first, last = span(*bins.ends[0]), span(*bins.ends[-1])
     text = (
-        f"The simulation of {e.channel.name} is {off(mean[0], unit)} {first} after the start (RMS error "
-        f"{error(rms[0], unit)}) and {off(mean[-1], unit)} {last} after it (RMS error {error(rms[-1], unit)}): "
+        f"The simulation of {e.channel.name} is {mean_error(mean[0], unit)} {first} after the start (RMS error "
+        f"{error(rms[0], unit)}) and {mean_error(mean[-1], unit)} {last} after it (RMS error {error(rms[-1], unit)}): "
         f"{_squared(share)}."
     )
     yield View("time since the start", e.channel.name, share, p, text, bins.centres, _floats(mean), "s")
@@ -130,8 +130,8 @@ def _by_mean(
     high, low = int(np.argmax(mean)), int(np.argmin(mean))
     unit = e.channel.unit
     text = (
-        f"The simulation of {e.channel.name} is {off(mean[high], unit)} in {labels[high]} and "
-        f"{off(mean[low], unit)} in {labels[low]}: {_squared(share)}."
+        f"The simulation of {e.channel.name} is {mean_error(mean[high], unit)} in {labels[high]} and "
+        f"{mean_error(mean[low], unit)} in {labels[low]}: {_squared(share)}."
     )
     return View(view, e.channel.name, share, p, text, _counted(mean), _floats(mean), "")
 

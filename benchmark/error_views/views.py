@@ -18,7 +18,7 @@ from simgap.error_views.variables import (
     by_experiment,
     derivative,
 )
-from simgap.error_views.wording import off, rate
+from simgap.error_views.wording import mean_error, rate
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
 from simgap.wording import percent
@@ -106,8 +106,8 @@ def _binned(e: Errors, view: str, unit: str, bins: Bins) -> View:
     high, low = _extremes(mean, count, parents)
     name, e_unit = e.channel.name, e.channel.unit
     text = (
-        f"The simulation of {name} is {off(mean[high], e_unit)} {bins.where[high]} and "
-        f"{off(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
+        f"The simulation of {name} is {mean_error(mean[high], e_unit)} {bins.where[high]} and "
+        f"{mean_error(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
         f"{', beyond what the direction explains' if bins.parents else ''}."
     )
     return View(view, name, share, p, text, bins.centres, tuple(map(float, mean)), unit)

@@ -14,7 +14,7 @@ def error(value: float, unit: str) -> str:
     return amount(value, unit, DIGITS)
 
 
-def off(mean: float, unit: str) -> str:
+def mean_error(mean: float, unit: str) -> str:
     """Say how far off a simulation is whose mean error is y - y_hat: 0.8, "deg" -> "0.8 deg too low"."""
     return f"{error(abs(mean), unit)} too {'low' if mean > 0 else 'high'}" if mean else "right on average"
 

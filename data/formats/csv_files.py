@@ -18,7 +18,7 @@ PLAIN = "".join(NUMBER_CHARACTERS).encode() + b",\n"
 
 
 def read_csv(path: Path) -> Table:
-    """The CSV file as a table; rows are named by line, the header is line 1.
+    """Read a CSV file as a table; rows are named by line, the header is line 1.
 
     Raises UnusableInput for anything but UTF-8 text with commas, one header line and one line per sample.
     """
@@ -34,7 +34,7 @@ def read_csv(path: Path) -> Table:
 
 
 def plain_table(path: Path, content: bytes) -> Table | None:
-    """The table in a file of several columns of plain numbers, the same to the bit as by the strict reader; else None.
+    """Read a file of several columns of plain numbers, to the bit as the strict reader would; give None for any other.
 
     Pandas says here only whether every row has the same number of cells and every cell is a number. What it
     would take beyond that, such as nan, quotes and cells longer than the csv module allows, is looked for before.
@@ -54,7 +54,7 @@ def plain_table(path: Path, content: bytes) -> Table | None:
 
 
 def _names(header: bytes) -> tuple[str, ...]:
-    """The names of the columns; none where a header line needs more than a look for its commas."""
+    """Split the names of the columns; give none where the header needs more than a look for its commas."""
     try:
         text = header.decode("utf-8-sig")
     except UnicodeDecodeError:

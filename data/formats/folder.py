@@ -13,7 +13,7 @@ from simgap.records import Dataset, Experiment, UnusableInput
 
 
 def load_folder(folder: Path) -> Dataset:
-    """The data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
+    """Read the data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
     described = read_description(folder / FILE)
     files = {split: _matching(folder, split, pattern) for split, pattern in described.splits.items()}
     names = _experiment_names(folder, files)
@@ -30,7 +30,7 @@ def load_folder(folder: Path) -> Dataset:
 
 
 def natural_order(name: str) -> tuple[list[str | int], str]:
-    """Sort key that puts "run_10" after "run_9"; no two names share a key."""
+    """Make a sort key that puts "run_10" after "run_9"; no two names share a key."""
     return [int(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+)", name))], name
 
 
@@ -42,7 +42,7 @@ def _experiment(file: Path, name: str, described: Description) -> Experiment:
 
 
 def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
-    """The files of a split in natural order. Raises UnusableInput for none and for one outside the folder."""
+    """Find the files of a split, in natural order. Raises UnusableInput for none and for one outside the folder."""
     where = f"{folder / FILE}: splits.{split} = {pattern!r}"
     for flavour in (PurePosixPath(pattern), PureWindowsPath(pattern)):
         if flavour.anchor or ".." in flavour.parts or not flavour.parts:
@@ -63,7 +63,7 @@ def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
 
 
 def _experiment_names(folder: Path, files: dict[str, list[Path]]) -> dict[Path, str]:
-    """File -> experiment name: the bare file name where that is unique, else more of the path."""
+    """Name the experiment of each file: the bare file name where that is unique, else more of the path."""
     every = [file for found in files.values() for file in found]
     seen: set[Path] = set()
     for file in every:

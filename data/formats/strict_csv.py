@@ -48,7 +48,7 @@ def strict_table(path: Path, content: bytes) -> Table:
 
 
 def parse_text(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
-    """Cells of text as float64. Raises BadCell at the first that is not a plain decimal number."""
+    """Turn cells of text into float64. Raises BadCell at the first that is not a plain decimal number."""
     if NUMBER_CHARACTERS.issuperset("".join(cells)):
         try:
             return np.array(list(map(float, cells)), dtype=np.float64)
@@ -90,7 +90,7 @@ def _text(path: Path, content: bytes) -> str:
 
 
 def _rows(path: Path, text: str) -> Iterator[list[str]]:
-    """The rows as cells, each checked to be one line, so that row i is line i of the file."""
+    """Yield the rows as cells, each checked to be one line, so that row i is line i of the file."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     number = 0
     try:

@@ -35,11 +35,11 @@ class Table:
         return len(self.cells[0]) if self.cells else 0
 
     def refuse(self, index: int, column: str, why: str) -> UnusableInput:
-        """The error that names the source, the row of sample `index` and the column."""
+        """Make the error that names the source, the row of sample `index` and the column."""
         return UnusableInput(f"{self.source}: row {index + self.first_row}, column {short(column)}: {why}")
 
     def cells_of(self, column: str) -> Any:
-        """The column as it came. Raises UnusableInput when it is missing or doubled."""
+        """Give a column as it came. Raises UnusableInput when it is missing or doubled."""
         found = self.names.count(column)
         if found == 1:
             return self.cells[self.names.index(column)]
@@ -51,7 +51,7 @@ class Table:
         raise UnusableInput(f"{header} {why}")
 
     def numbers(self, column: str) -> Float[np.ndarray, " T"]:
-        """The column as float64. Raises UnusableInput when it is missing, doubled or holds a bad cell."""
+        """Give a column as float64. Raises UnusableInput when it is missing, doubled or holds a bad cell."""
         try:
             values = self.parse(self.cells_of(column))
         except BadCell as bad:

@@ -14,7 +14,7 @@ VIEWS = 3  # of what is wrong; the page shows all
 
 
 def diagnosis_text(findings: Findings, width: int = 100) -> str:
-    """What was found, in lines of at most `width` characters that a control engineer can act on.
+    """Write the answer in lines of at most `width` characters that a control engineer can act on.
 
     Names from data sets are shown, never obeyed: what a terminal would interpret is left out.
     """
@@ -24,7 +24,7 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         *_section("What it gets wrong", _wrong(findings), width),
     ]
     for i, cause in enumerate(findings.causes, start=1):
-        paragraphs += _section(f"Cause {i}: {words.named(cause, findings)}", _cause(cause), width)
+        paragraphs += _section(f"Cause {i}: {words.cause_title(cause, findings)}", _cause(cause), width)
     if second := words.runner_up(findings):
         paragraphs += _section("Runner-up", [second], width)
     if findings.causes:
@@ -45,7 +45,7 @@ def _section(title: str, items: Iterator[str] | list[str] | tuple[str, ...], wid
 
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """Further lines stand deeper, so that one sees where an item begins."""
+    """Wrap an item, its further lines indented, so that one sees where it begins."""
     return textwrap.wrap(
         printable(text), max(width, 20), initial_indent=indent, subsequent_indent=2 * indent, break_on_hyphens=False
     )
@@ -60,7 +60,7 @@ def _baseline(findings: Findings) -> Iterator[str]:
 
 
 def _wrong(findings: Findings) -> list[str]:
-    views = words.telling(findings)
+    views = words.beyond_chance(findings)
     shown = [view for view in views if view.view != words.LAST][:VIEWS] or views[:1]
     return [view.text for view in shown] or ["No view of its error shows more than chance does."]
 

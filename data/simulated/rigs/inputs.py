@@ -20,27 +20,27 @@ def draw_input(rig: Rig, kind: str, rng: Generator) -> Float[np.ndarray, " T"]:
 
 
 def _steps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Levels within 1, each held for 5 to 25 samples."""
+    """Draw levels within 1, each held for 5 to 25 samples."""
     holds = rng.integers(5, 26, samples // 5)
     return np.repeat(rng.uniform(-1.0, 1.0, len(holds)), holds)[:samples]
 
 
 def _sines(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Six sines with periods of 12 to 150 samples; the largest value is 1."""
+    """Add six sines with periods of 12 to 150 samples; the largest value is 1."""
     periods = np.geomspace(12, 150, 6) * rng.uniform(0.85, 1.15, 6)
     waves = np.sin(2 * np.pi * (np.arange(samples)[:, None] / periods + rng.random(6))).sum(axis=1)  # [T]
     return waves / np.abs(waves).max()
 
 
 def _triangle(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Slow ramps to and fro between turning points of either sign, 25 to 60 samples apart."""
+    """Draw slow ramps to and fro between turning points of either sign, 25 to 60 samples apart."""
     turns = np.cumsum(rng.integers(25, 61, samples // 25 + 2)) - 25
     peaks = rng.uniform(0.4, 1.0, len(turns)) * (-1.0) ** (np.arange(len(turns)) + rng.integers(2))
     return np.interp(np.arange(samples), turns, peaks)
 
 
 def _chirp(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """A sine whose period falls from about 120 to about 10 samples."""
+    """Make a sine whose period falls from about 120 to about 10 samples."""
     k = np.arange(samples) / samples
     slow, fast = samples / rng.uniform(100, 140), samples / rng.uniform(8, 14)  # periods per experiment
     return np.sin(2 * np.pi * (slow * k + (fast - slow) * k**2 / 2 + rng.random()))

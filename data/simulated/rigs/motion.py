@@ -35,6 +35,6 @@ def simulate_motion(
 
 
 def _band(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:
-    """Band-limited noise of standard deviation about 1: twenty sines with periods of 10 to 100 samples."""
+    """Draw band-limited noise of standard deviation about 1: twenty sines with periods of 10 to 100 samples."""
     frequencies, phases = rng.uniform(1 / 100, 1 / 10, 20), rng.random(20)
     return np.sin(2 * np.pi * (np.arange(samples)[:, None] * frequencies + phases)).sum(axis=1) / np.sqrt(10)
