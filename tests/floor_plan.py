@@ -12,6 +12,7 @@ RUN = {"metrics", "tasks", "results", "running"}
 MAY_IMPORT: dict[str, set[str]] = {
     "records": set(),
     "findings": set(),
+    "wording": set(),
     "protocol": {"records"},
     "registry": {"records"},
     "metrics": {"records"},
@@ -20,11 +21,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "results": GROUND | {"metrics", "tasks", "running.suites"},
     "running": GROUND | {"metrics", "tasks", "results", "data"},
     "greybox": GROUND | {"findings"},
-    "error_views": {"records", "metrics", "findings"},
+    "error_views": {"records", "metrics", "findings", "wording"},
     "baselines": GROUND | {"data", "greybox"},
     "neural": GROUND | {"data"},
     "contract": GROUND | RUN | {"data"},
-    "reports": {"records", "metrics", "results", "findings", "greybox.effects"},
+    "reports": {"records", "metrics", "results", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "data", "greybox", "error_views", "reports"},
     "simgap": GROUND | RUN | {"data", "diagnosis", "reports"},
