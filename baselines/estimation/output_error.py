@@ -1,59 +1,19 @@
-"""Output error: y = B(q)/F(q) u + e by minimising the error of the simulation itself."""
+"""The simulation error of y = B(q)/F(q) u + e, its sum of squares and its Jacobian."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.filters import divide, multiply
-from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
+from simgap.baselines.estimation.fitted import Row
+from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
-from simgap.baselines.estimation.polynomial import Polynomial
-from simgap.baselines.estimation.starts import oe_starts
-from simgap.records import Experiment, UnusableInput
-
-
-def estimate_oe(
-    experiments: Sequence[Experiment],
-    shift: Float[np.ndarray, " S"],
-    orders: Orders,
-    constant: bool = True,
-    n_start: int | None = None,
-    start: LinearFit | None = None,
-) -> LinearFit:
-    """Minimise the squared simulation error, one output at a time, F kept stable (Ljung 1999, section 10.2).
-
-    With n_start, each simulation starts from the state that the first n_start samples show, and only what follows
-    counts: the error that is minimised is the free run that will be scored. Without it the start states are free
-    parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
-    The search begins at `start`, an earlier fit, and around its operating point, or else at the two best of several
-    linear estimates. Raises TooFewSamples when the experiments are too short for the order.
-    """
-    shift = start.operating_point if start else shift
-    ny = len(orders.nb)
-    rows, transfers, constants, samples = [], [], np.zeros(ny), 0
-    for i in range(ny):
-        equation = OutputError.of(experiments, shift, orders, i, constant, n_start)
-        samples = equation.samples
-        check_length(samples, equation.n_params, equation.n_start or 0)
-        if start:
-            begin = [equation.theta_of(start.rows[i])]
-        else:
-            candidates = oe_starts(experiments, shift, orders, i, equation)
-            begin = sorted(candidates, key=equation.squares)[:2]
-        searches = [minimise(equation, theta) for theta in begin]
-        best = min(searches, key=lambda search: search.cost.squares)
-        names = equation.names
-        rows.append(Row.at(best, names, range(len(names)), samples))
-        transfers.append(equation.transfer(best.theta))
-        constants[i] = best.theta[-1] if constant else 0.0
-    return _assemble(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
+from simgap.records import UnusableInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,25 +194,3 @@ class _Run:
         """e without the samples that the start was found from, unless those are all."""
         n = self.inverse.shape[1]
         return self.e[:, n:] if n < self.e.shape[1] else self.e
-
-
-def _assemble(
-    dt: float,
-    shift: np.ndarray,
-    orders: Orders,
-    rows: tuple[Row, ...],
-    transfers: list,
-    constants: np.ndarray,
-    samples: int,
-) -> LinearFit:
-    """One polynomial model: A is diagonal with the common denominators, and C = A."""
-    ny, nu = orders.nb.shape
-    order = max(max(len(f), *map(len, numerators.values())) for f, numerators in transfers) - 1
-    a, b = np.zeros((order + 1, ny, ny)), np.zeros((order + 1, ny, nu))
-    for i, (f, numerators) in enumerate(transfers):
-        a[: len(f), i, i] = f
-        for j, numerator in numerators.items():
-            b[: len(numerator), i, j] = numerator
-    # The constant was added to the output, so it is part of the operating point already.
-    polynomial = Polynomial(a, b, a, shift[ny:], shift[:ny] + constants, dt)
-    return LinearFit(polynomial, orders, rows, constants, samples)

@@ -1,51 +1,19 @@
-"""ARMAX: A(q) y = B(q) u + C(q) e by minimising the one-step prediction error."""
+"""The one-step prediction error of A(q) y = B(q) u + C(q) e, its sum of squares and its Jacobian."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names
 from simgap.baselines.estimation.filters import divide, multiply
-from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.gram import Gram, lagged_gram
-from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
+from simgap.baselines.estimation.fitted import Row
+from simgap.baselines.estimation.gram import Gram
+from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
-from simgap.baselines.estimation.starts import armax_starts
-from simgap.records import Experiment
-
-
-def estimate_armax(
-    experiments: Sequence[Experiment],
-    shift: Float[np.ndarray, " S"],
-    orders: Orders,
-    constant: bool = True,
-    start: LinearFit | None = None,
-) -> LinearFit:
-    """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, C kept stable.
-
-    The search begins at `start`, an earlier fit, and around its operating point, or else at two linear estimates.
-    Ljung 1999, sections 7.2 and 10.2. Raises TooFewSamples when the experiments are too short for the order.
-    """
-    gram = lagged_gram(experiments, start.operating_point if start else shift, orders.max_lag)
-    ny = len(orders.na)
-    rows, constants, noise = [], np.zeros(ny), []
-    for i in range(ny):
-        check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
-        equation = PredictionError.of(gram, orders, i, constant)
-        begin = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
-        searches = [minimise(equation, theta) for theta in begin]
-        best = min(searches, key=lambda search: search.cost.squares)
-        names = coefficient_names(orders.lagged(i), *orders.nb.shape)
-        names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
-        rows.append(Row.at(best, names, equation.coefficients, equation.samples))
-        constants[i] = best.theta[equation.linear - 1] if constant else 0.0
-        noise.append(equation.noise(best.theta))
-    return assemble(gram, orders, tuple(rows), constants, noise)
 
 
 @dataclass(frozen=True, eq=False)

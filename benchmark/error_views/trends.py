@@ -11,6 +11,7 @@ from simgap.error_views import chance
 from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
+from simgap.error_views.wording import between, error, mean_error, rate, span
 from simgap.findings import Wrong
 from simgap.wording import amount, number, percent
 
@@ -27,10 +28,8 @@ def offset(e: Errors) -> Iterator[Wrong]:
         share, p = chance.by_experiments(e.error, e.experiment, np.zeros(n, dtype=int), 0.0)
     else:
         share, p = chance.by_trend(e.error, np.full(len(e.error), mean), 1, 1, e.experiment)
-    text = f"The simulation of {e.channel.name} is {off(mean, e.channel.unit)} on average: {_squared(share)}."
-    yield Wrong("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
     text = f"The simulation of {e.channel.name} is {mean_error(mean, e.channel.unit)} on average: {_squared(share)}."
-    yield View("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
+    yield Wrong("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
 
 
 def time_since_start(e: Errors) -> Iterator[Wrong]:

@@ -18,6 +18,7 @@ from simgap.error_views.variables import (
     by_experiment,
     derivative,
 )
+from simgap.error_views.wording import mean_error, rate
 from simgap.findings import Wrong
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
