@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import inspect
 import os
 import pickle
 from collections.abc import Callable, Iterator
@@ -17,9 +18,13 @@ from simgap.records import Channels, Dataset, Result, Status
 from simgap.registry import MODELS
 from simgap.results.store import plain
 from simgap.running.fitting import build, fit_model, model_class, reason, score_model
-from simgap.running.provenance import source_sha256
+from simgap.running.source import Code, code_of
 from simgap.running.suites import Entry
 from simgap.tasks import TASKS
+
+# What takes seconds to import, by the package that a model's code imports. torch._dynamo is what the first step of an
+# optimiser imports.
+SLOW_IMPORTS = {"torch": ("torch", "torch._dynamo", "safetensors.torch")}
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Job:
-    """One fit with all its simulations."""
+    """One fit with all its simulations; `preload` are modules that are imported once for all jobs."""
 
     entry: Entry
     source: Source
@@ -63,6 +68,7 @@ class Job:
     seed: int
     tasks: tuple[str, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
+    preload: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.entry.label} on {self.card.name}, seed {self.seed}"
@@ -125,10 +131,21 @@ def _load(job: Job) -> Dataset:
     return pickle.loads(file.read_bytes())  # from the run's own folder, which nobody else may write
 
 
-def model_sha256(entry: Entry) -> str:
-    """Digest of the code of the model, and of the other one that it is told to use, if it is. Raises UnusableInput."""
-    inner = [value for value in entry.params.values() if isinstance(value, str) and value in MODELS]
-    return "".join(source_sha256(model_class(name)) for name in (entry.name, *inner))
+def model_code(entry: Entry) -> Code:
+    """The code of the model, and of the others that its parameters name, if they do. Raises UnusableInput."""
+    kind = model_class(entry.name)
+    arguments = inspect.signature(kind).bind(**entry.params)
+    arguments.apply_defaults()
+    others = [text for text in _texts(arguments.arguments) if text in MODELS]
+    return code_of([kind, *map(model_class, others)])
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for inner in value.values():
+            yield from _texts(inner)
 
 
 def progress_file(folder: str | Path, job: Job) -> Path:

@@ -17,13 +17,12 @@ from pathlib import Path
 from pebble import CONSTS, ProcessExpired, ProcessPool
 
 from simgap.records import Result
-from simgap.registry import MODELS
 from simgap.running.engines.engine import Event, Running
 from simgap.running.jobs import Job, execute, progress_file
 from simgap.running.workers import Limits, prepare_worker
 
 # Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
-# changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
+# changed since, and a job imports them in milliseconds.
 PRELOADED = (
     "simgap.running.jobs",
     "simgap.running.engines.preloading",
@@ -31,7 +30,6 @@ PRELOADED = (
     "scipy.optimize",
     "scipy.stats",
 )
-PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
 
 # Seconds between two looks of the pool at its processes, of which every job needs a new one.
 CONSTS.sleep_unit = 0.02
@@ -72,9 +70,7 @@ def _context(todo: Sequence[Job]) -> BaseContext:
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    named = {str(name) for job in todo for name in (job.entry.name, *job.entry.params.values())}
-    networks = any(MODELS.module(name).startswith("simgap.neural.") for name in named)
-    context.set_forkserver_preload([*PRELOADED, *(PRELOADED_FOR_NETWORKS if networks else ())])
+    context.set_forkserver_preload(list(dict.fromkeys([*PRELOADED, *(name for job in todo for name in job.preload)])))
     return context
 
 

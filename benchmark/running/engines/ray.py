@@ -13,7 +13,7 @@ from typing import Any
 from simgap.records import Result, UnusableInput
 from simgap.running.engines.engine import Event
 from simgap.running.engines.local import Local
-from simgap.running.jobs import Job, model_sha256
+from simgap.running.jobs import Job, model_code
 from simgap.running.workers import Limits
 
 # How often a job is tried again because its node went away; what the model does is a row and is not tried again.
@@ -74,7 +74,7 @@ class Cluster:
 
 def _on_a_node(job: Job, limits: Limits) -> list[Result]:
     """Runs on the cluster: one job in a process of its own, as on one machine."""
-    if model_sha256(job.entry) != job.provenance["model_sha256"]:
+    if model_code(job.entry).sha256() != job.provenance["model_sha256"]:
         return job.failed("error", "this node of the cluster has another version of the model's code")
     environment = {name: path for name, path in limits.environment.items() if Path(path).parent.is_dir()}
     if VISIBLE in os.environ:
