@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,23 @@ from simgap.running.suites import Entry, Suite
 Note = Callable[[str], None]
 
 
-def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note) -> list[Entry]:
-    """The models to run: those named in `models` and `files` (`file.py:Class`), or else the suite's.
+@dataclass(frozen=True)
+class Choice:
+    """What the user named in place of a suite's: models, files of models (`file.py:Class`), data sets."""
+
+    models: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    sources: tuple[Source, ...] = ()
+
+
+def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
+    """The models to run: those that the user named, or else the suite's.
 
     A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
     that the user named raises UnusableInput.
     """
     by_label = {entry.label: entry for entry in suite.models}
-    named = [by_label.get(name, Entry(name)) for name in models or ()] + [Entry(name) for name in files]
+    named = [by_label.get(name, Entry(name)) for name in choice.models] + [Entry(name) for name in choice.files]
     entries = []
     for entry in named or suite.models:
         try:
