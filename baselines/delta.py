@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from simgap.protocol import is_stochastic
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -45,6 +46,11 @@ class Delta:
         else:
             differences = self.inner.simulate(u[:, 1:], np.diff(y_init, axis=1))
         return y_init[:, -1:] + np.cumsum(differences, axis=1)
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether the other model is."""
+        return is_stochastic(self.inner)
 
     @property
     def n_params(self) -> int | None:

@@ -101,6 +101,8 @@ def it_fits_and_says_plainly_what_it_chose(candidate: Candidate) -> None:
     if not isinstance(fitted := getattr(model, "fitted", None) or {}, dict):
         raise ModelFault(f"fitted is a {type(fitted).__name__}; make it a dict of what the fit chose")
     json.dumps(plain(fitted), allow_nan=False)
+    if not isinstance(stochastic := getattr(model, "stochastic", False), bool):
+        raise ModelFault(f"stochastic is {stochastic!r}; make it True where another seed gives other numbers")
 
 
 def it_returns_the_rows_after_the_start_as_float64(candidate: Candidate) -> None:

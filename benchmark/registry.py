@@ -44,6 +44,7 @@ class Registry:
     constant: str
     _found: dict[str, Any] = field(default_factory=dict)
     _entries: dict[str, _Entry] | None = None
+    _installed: dict[str, Any] | None = None
 
     def register(self, name: str) -> Callable[[T], T]:
         """Class or function decorator that files its target under `name`; a name taken twice is an error."""
@@ -120,7 +121,10 @@ class Registry:
         return ""
 
     def _plugins(self) -> dict[str, Any]:
-        return {point.name: point for point in entry_points(group=f"simgap.{self.kind.replace(' ', '')}s")}
+        if self._installed is None:
+            group = f"simgap.{self.kind.replace(' ', '')}s"
+            self._installed = {point.name: point for point in entry_points(group=group)}
+        return self._installed
 
     def _index(self) -> dict[str, _Entry]:
         if self._entries is None:

@@ -18,7 +18,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "metrics": {"records"},
     "tasks": {"records", "metrics"},
     "data": GROUND,
-    "results": GROUND | {"metrics", "tasks", "running.suites"},
+    "results": GROUND | {"metrics", "tasks"},
     "running": GROUND | {"metrics", "tasks", "results", "data"},
     "greybox": GROUND | {"findings"},
     "error_views": {"records", "metrics", "findings", "wording"},

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import math
-import os
 import re
 import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict
-from io import FileIO
 from pathlib import Path
 from typing import Any, get_args
 
 from simgap.records import Result, Status, UnusableInput
+from simgap.results import lines
 
 Key = tuple[str, str, str, str, str, int]
 
 # Larger ones are no floating-point numbers; infinities are written as texts.
 LARGEST_NUMBER = sys.float_info.max
-# Bytes of a file of results.
-LARGEST_FILE = 1 << 30
 
 _NUMBER = (int, float, type(None))
 _REQUIRED: dict[str, Any] = {
@@ -58,24 +54,11 @@ def writable(folder: Path) -> Path:
 
 def append(folder: Path, suite: str, results: Sequence[Result]) -> None:
     """Write the results of one job with one write per file, under a lock that other processes respect."""
-    from filelock import FileLock
-
     by_path: dict[Path, list[Result]] = {}
     for result in results:
         by_path.setdefault(path_of(folder, suite, result.model), []).append(result)
     for path, rows in by_path.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lines = _lines(rows)
-        with FileLock(Path(folder) / ".lock"), path.open("r+b" if path.exists() else "w+b", buffering=0) as file:
-            size = _mend(file)
-            try:
-                file.seek(size)
-                if file.write(lines) != len(lines):
-                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-                os.fsync(file.fileno())
-            except OSError as error:  # a full disk takes a part of them
-                file.truncate(size)
-                raise OSError(error.errno, error.strerror, str(path)) from error
+        lines.append(path, _encoded_lines(rows), lock_of(folder))
 
 
 def tidy(folder: Path, suite: str, model: str) -> None:
@@ -85,15 +68,15 @@ def tidy(folder: Path, suite: str, model: str) -> None:
     path = path_of(folder, suite, model)
     if not path.exists():
         return
-    with FileLock(Path(folder) / ".lock"):
+    with FileLock(lock_of(folder)):
         rows = read(path)
-        if len(rows) == path.read_bytes().count(b"\n"):
-            return
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}", delete=False) as file:
-            file.write(_lines(rows))
-            file.flush()
-            os.fsync(file.fileno())
-        Path(file.name).replace(path)
+        if len(rows) != path.read_bytes().count(b"\n"):
+            lines.replace(path, _encoded_lines(rows))
+
+
+def lock_of(folder: Path) -> Path:
+    """The file that is locked while something is written into a folder of results."""
+    return Path(folder) / ".lock"
 
 
 def read(path: Path) -> list[Result]:
@@ -104,12 +87,7 @@ def read(path: Path) -> list[Result]:
     """
     rows: dict[Key, Result] = {}
     for file in sorted(path.glob("*.jsonl")) if path.is_dir() else [path]:
-        if file.stat().st_size > LARGEST_FILE:
-            raise UnusableInput(f"{file} is larger than any file of results")
-        *lines, last = file.read_bytes().split(b"\n")
-        if last and _is_json(last):
-            lines.append(last)
-        for number, line in enumerate(lines, start=1):
+        for number, line in enumerate(lines.read(file), start=1):
             result = _decode(line, f"{file}, line {number}")
             rows[key(result)] = result
     return list(rows.values())
@@ -140,30 +118,8 @@ def plain(value: Any) -> Any:
     return str(value).encode("utf-8", "replace").decode()  # half of a pair of surrogates is no UTF-8
 
 
-def _lines(rows: Sequence[Result]) -> bytes:
+def _encoded_lines(rows: Sequence[Result]) -> bytes:
     return "".join(encode(row) + "\n" for row in rows).encode()
-
-
-def _mend(file: FileIO) -> int:
-    """End an unfinished last line if it is a whole result, else cut it off; the size that the file then has."""
-    size = file.seek(0, os.SEEK_END)
-    if size:
-        file.seek(size - 1)
-    if file.read(1) in (b"", b"\n"):
-        return size
-    file.seek(0)
-    last = file.readall().rpartition(b"\n")[2]
-    if _is_json(last):
-        return size + file.write(b"\n")
-    return file.truncate(size - len(last))
-
-
-def _is_json(line: bytes) -> bool:
-    try:
-        json.loads(line)
-    except (ValueError, RecursionError):
-        return False
-    return True
 
 
 def _decode(line: bytes, where: str) -> Result:

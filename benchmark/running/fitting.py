@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.metrics import failed_metrics
-from simgap.protocol import Model
+from simgap.protocol import Model, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
@@ -115,7 +115,7 @@ def build(reference: str, params: dict[str, Any]) -> Model:
 
 
 def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
-    """Fit the model; `about` comes back with what the fit chose, its size, seconds and warnings."""
+    """Fit the model; `about` comes back with what it declares, what the fit chose, its size, seconds and warnings."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         start = time.perf_counter()
@@ -128,6 +128,7 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         n_params=int(n_params) if isinstance(n_params, int | np.integer) else None,
         fit_seconds=seconds,
         message=_shortened("; ".join(dict.fromkeys(str(w.message) for w in caught))),
+        provenance=about.provenance | {"stochastic": is_stochastic(model)},
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +12,30 @@ from simgap.registry import DATASETS
 from simgap.results import store
 from simgap.results.store import plain
 from simgap.running.fitting import check_params
-from simgap.running.jobs import Card, Job, Source, model_sha256
+from simgap.running.jobs import SLOW_IMPORTS, Card, Job, Source, model_code
+from simgap.running.source import Code
 from simgap.running.suites import Entry, Suite
 
 Note = Callable[[str], None]
 
 
-def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note) -> list[Entry]:
-    """The models to run: those named in `models` and `files` (`file.py:Class`), or else the suite's.
+@dataclass(frozen=True)
+class Choice:
+    """What the user named in place of a suite's: models, files of models (`file.py:Class`), data sets."""
+
+    models: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    sources: tuple[Source, ...] = ()
+
+
+def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
+    """The models to run: those that the user named, or else the suite's.
 
     A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
     that the user named raises UnusableInput.
     """
     by_label = {entry.label: entry for entry in suite.models}
-    named = [by_label.get(name, Entry(name)) for name in models or ()] + [Entry(name) for name in files]
+    named = [by_label.get(name, Entry(name)) for name in choice.models] + [Entry(name) for name in choice.files]
     entries = []
     for entry in named or suite.models:
         try:
@@ -77,17 +87,21 @@ def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple
 def plan(
     suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[Source, Card]], provenance: dict[str, Any]
 ) -> list[Job]:
-    """All jobs, one data set after the other, because a worker keeps the last one it loaded.
+    """All jobs, one data set after the other.
 
     Each carries a digest of its model's code: results of the old code must not stand for the new.
     """
-    digests = {id(entry): {"model_sha256": model_sha256(entry)} for entry in entries}
+    codes = [model_code(entry) for entry in entries]
     return [
-        Job(entry, source, card, seed, suite.tasks, provenance | digests[id(entry)])
+        Job(entry, source, card, seed, suite.tasks, provenance | {"model_sha256": code.sha256()}, _slow_imports(code))
         for source, card in data
         for seed in range(suite.seeds)
-        for entry in entries
+        for entry, code in zip(entries, codes, strict=True)
     ]
+
+
+def _slow_imports(code: Code) -> tuple[str, ...]:
+    return tuple(module for package in sorted(code.outside) for module in SLOW_IMPORTS.get(package, ()))
 
 
 def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.Key, Result]:

@@ -8,7 +8,7 @@ import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -42,6 +42,8 @@ class Network(ABC):
     an experiment does not depend on those beside it. resident=False trains on windows without a copy of the data in
     memory. log: folder for TensorBoard. Raises UnusableInput.
     """
+
+    stochastic: ClassVar[bool] = True
 
     mode: Literal["windowed", "stateful"] = "stateful"
     window: int = 40
