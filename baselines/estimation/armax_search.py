@@ -36,8 +36,8 @@ def estimate_armax(
     for i in range(ny):
         check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
         equation = PredictionError.of(gram, orders, i, constant)
-        begin = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
-        searches = [minimise(equation, theta) for theta in begin]
+        thetas = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
+        searches = [minimise(equation, theta) for theta in thetas]
         best = min(searches, key=lambda search: search.cost.squares)
         names = coefficient_names(orders.lagged(i), *orders.nb.shape)
         names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
@@ -48,7 +48,7 @@ def estimate_armax(
 
 
 def armax_starts(gram: Gram, orders: Orders, output: int, equation: PredictionError) -> Iterator[np.ndarray]:
-    """Plain ARX, and Hannan and Rissanen's regression on the errors of a long ARX model (1982)."""
+    """Yield theta of plain ARX and of Hannan and Rissanen's regression on the errors of a long ARX model (1982)."""
     arx = estimate_arx(gram, orders, equation.constant)
     constant = arx.constants[output : output + 1] if equation.constant else []
     yield np.concatenate((arx.rows[output].values, constant, np.zeros(equation.nc)))
@@ -65,11 +65,11 @@ def armax_starts(gram: Gram, orders: Orders, output: int, equation: PredictionEr
 
 
 def _errors_of(fit: LinearFit, u: np.ndarray, y: np.ndarray, output: int, skip: int, before: int) -> np.ndarray:
-    """[B, before + T - skip]: one-step errors of one output, zero where they are not known."""
+    """Compute the one-step errors [B, before + T - skip] of one output, zero where they are not known."""
     model = fit.polynomial
     e = np.zeros((y.shape[0], before + y.shape[1] - skip))
     signals = np.concatenate((y - model.y_mean, u - model.u_mean), axis=2)
     taps = np.concatenate((model.a, -model.b), axis=2)[:, output]  # [N1, S]
-    known = np.sum([multiply(taps[:, s], signals[:, :, s]) for s in range(signals.shape[2])], axis=0)
-    e[:, before + model.order - skip :] = known[:, model.order :]
+    e_known = np.sum([multiply(taps[:, s], signals[:, :, s]) for s in range(signals.shape[2])], axis=0)
+    e[:, before + model.order - skip :] = e_known[:, model.order :]
     return e

@@ -43,11 +43,11 @@ def estimate_oe(
         samples = equation.samples
         check_length(samples, equation.n_params, equation.n_start or 0)
         if start:
-            begin = [equation.theta_of(start.rows[i])]
+            thetas = [equation.theta_of(start.rows[i])]
         else:
             candidates = oe_starts(experiments, shift, orders, i, equation)
-            begin = sorted(candidates, key=equation.squares)[:2]
-        searches = [minimise(equation, theta) for theta in begin]
+            thetas = sorted(candidates, key=equation.squares)[:2]
+        searches = [minimise(equation, theta) for theta in thetas]
         best = min(searches, key=lambda search: search.cost.squares)
         names = equation.names
         rows.append(Row.at(best, names, range(len(names)), samples))
@@ -59,32 +59,34 @@ def estimate_oe(
 def oe_starts(
     experiments: Sequence[Experiment], shift: np.ndarray, orders: Orders, output: int, equation: OutputError
 ) -> Iterator[np.ndarray]:
-    """ARX on the data and on the free run of a long ARX, each refined by Steiglitz and McBride (1965)."""
+    """Yield theta of ARX on the data and on the free run of a long ARX, each refined by Steiglitz-McBride (1965)."""
     ny = len(orders.nb)
-    kept = [output, *range(ny, len(shift))]
+    signals = [output, *range(ny, len(shift))]
     own = [Experiment(e.name, e.u, e.y[:, output : output + 1], e.dt) for e in experiments]
-    yield from _prefiltered(own, shift[kept], equation)
+    yield from _steiglitz_mcbride(own, shift[signals], equation)
     lags = max(orders.max_lag, int(orders.nf.max()))
-    length = min(3 * lags + 20, min(map(len, own)) // 4, sum(map(len, own)) // (4 * len(kept)))
+    length = min(3 * lags + 20, min(map(len, own)) // 4, sum(map(len, own)) // (4 * len(signals)))
     if length > lags:
-        long = Orders.of(1, len(kept) - 1, na=length, nb=length, nk=1)
-        model = estimate_arx(lagged_gram(own, shift[kept], length), long).polynomial
+        long = Orders.of(1, len(signals) - 1, na=length, nb=length, nk=1)
+        model = estimate_arx(lagged_gram(own, shift[signals], length), long).polynomial
         if np.abs(model.poles).max() < 1:
             smooth = [
                 Experiment("", *simulated, own[0].dt)
                 for u, y in stack(own)
                 for simulated in zip(u[:, length:], model.simulate(u, y[:, :length]), strict=True)
             ]
-            yield from _prefiltered(smooth, shift[kept], equation)
+            yield from _steiglitz_mcbride(smooth, shift[signals], equation)
 
 
-def _prefiltered(experiments: Sequence[Experiment], shift: np.ndarray, equation: OutputError) -> Iterator[np.ndarray]:
-    """theta of ARX fits to u/F and y/F, with F from the fit before."""
+def _steiglitz_mcbride(
+    experiments: Sequence[Experiment], shift: np.ndarray, equation: OutputError
+) -> Iterator[np.ndarray]:
+    """Yield theta of ARX fits to u/F and y/F, with F from the fit before."""
     nf = max(equation.nf[j] for j in equation.used)
     arx = Orders.of(1, len(equation.nb), na=nf, nb=[list(equation.nb)], nk=[list(equation.nk)])
     f = np.ones(1)
     for _ in range(8):
-        filtered = _divided(experiments, shift, f)
+        filtered = _filter(experiments, shift, f)
         model = estimate_arx(lagged_gram(filtered, np.zeros(len(shift)), arx.max_lag), arx).polynomial
         f = stable(model.a[: nf + 1, 0, 0], radius=1 - 1e-3)[0]
         slowest_first = sorted(np.roots(f), key=abs, reverse=True)
@@ -95,8 +97,8 @@ def _prefiltered(experiments: Sequence[Experiment], shift: np.ndarray, equation:
         yield np.concatenate([*theta, np.zeros(int(equation.constant))])
 
 
-def _divided(experiments: Sequence[Experiment], shift: np.ndarray, f: np.ndarray) -> list[Experiment]:
-    """The experiments with every signal filtered by 1/F."""
+def _filter(experiments: Sequence[Experiment], shift: np.ndarray, f: np.ndarray) -> list[Experiment]:
+    """Filter every signal of the experiments by 1/F."""
     return [
         Experiment("", *filtered, experiments[0].dt)
         for u, y in stack(experiments)
@@ -113,7 +115,7 @@ def _assemble(
     constants: np.ndarray,
     samples: int,
 ) -> LinearFit:
-    """One polynomial model: A is diagonal with the common denominators, and C = A."""
+    """Assemble one polynomial model: A is diagonal with the common denominators, and C = A."""
     ny, nu = orders.nb.shape
     order = max(max(len(f), *map(len, numerators.values())) for f, numerators in transfers) - 1
     a, b = np.zeros((order + 1, ny, ny)), np.zeros((order + 1, ny, nu))

@@ -28,12 +28,12 @@ class _Pass(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, w: Tensor, u: Tensor, b: Tensor, c: Tensor, kind: str, only_last: bool) -> Tensor:
         units = u.shape[1]
-        given = [value.detach().numpy() for value in (x, w, u, b, c)]
-        h, gates, inner = (np.empty((len(x), rows, x.shape[2]), given[0].dtype) for rows in (units, len(u), units))
+        arrays = [value.detach().numpy() for value in (x, w, u, b, c)]
+        h, gates, inner = (np.empty((len(x), rows, x.shape[2]), arrays[0].dtype) for rows in (units, len(u), units))
         if kind == "rnn":
-            kernels.run_rnn(*given[:3], given[3] + given[4], h)
+            kernels.run_rnn(*arrays[:3], arrays[3] + arrays[4], h)
         else:
-            kernels.run_gru(*given, h, gates, inner)
+            kernels.run_gru(*arrays, h, gates, inner)
         ctx.save_for_backward(x, w, u)
         ctx.rest = kind, only_last, h, gates, inner
         return torch.from_numpy(h[-1:] if only_last else h)
@@ -109,16 +109,16 @@ class Lstm(Layer, nn.LSTM):
 
 
 def recurrent(layer: type[Net], inputs: int, units: int) -> Net:
-    """A layer with the initial weights of Keras.
+    """Make a layer with the initial weights of Keras.
 
     Glorot uniform from the input, orthogonal from the state with all gates together, offsets zero but that of a
     forget gate, which is one.
     """
-    made: Any = layer(inputs, units, batch_first=True)  # type: ignore[call-arg]  # RNNBase asks for its kind
-    nn.init.xavier_uniform_(made.weight_ih_l0)
-    nn.init.orthogonal_(made.weight_hh_l0)
-    nn.init.zeros_(made.bias_ih_l0)
-    nn.init.zeros_(made.bias_hh_l0)
+    net: Any = layer(inputs, units, batch_first=True)  # type: ignore[call-arg]  # RNNBase asks for its kind
+    nn.init.xavier_uniform_(net.weight_ih_l0)
+    nn.init.orthogonal_(net.weight_hh_l0)
+    nn.init.zeros_(net.bias_ih_l0)
+    nn.init.zeros_(net.bias_hh_l0)
     if layer is Lstm:
-        made.bias_ih_l0.data[units : 2 * units] = 1.0
-    return made
+        net.bias_ih_l0.data[units : 2 * units] = 1.0
+    return net
