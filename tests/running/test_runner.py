@@ -168,7 +168,7 @@ def test_a_csv_file_is_run_with_its_columns_named(tmp_path, example):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        ({"engine": "slurm"}, "the engine 'slurm' is not known; choose local or ray"),
+        ({"engine": "slurm"}, "there is no engine called 'slurm'; known are local, ray"),
         ({"engine": "ray"}, "say where the cluster is: --address HOST:PORT"),
         ({"address": "here"}, "--address is for --engine ray"),
         ({"jobs": 0}, "at least one worker"),
