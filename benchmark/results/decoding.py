@@ -17,7 +17,7 @@ Number = int | float | Literal["inf", "-inf"]
 Figures = dict[str, Number | dict[str, Number]]
 
 
-class Row(msgspec.Struct, forbid_unknown_fields=True):
+class StoredRow(msgspec.Struct, forbid_unknown_fields=True):
     """The fields of a Result as they stand in a line."""
 
     model: str
@@ -38,10 +38,10 @@ class Row(msgspec.Struct, forbid_unknown_fields=True):
     schema: Literal[1] = 1
 
 
-_TYPES = get_type_hints(Row)
-_REQUIRED = tuple(field.name for field in msgspec.structs.fields(Row) if field.required)
+_TYPES = get_type_hints(StoredRow)
+_REQUIRED = tuple(field.name for field in msgspec.structs.fields(StoredRow) if field.required)
 _LIMITED = ("seed", "n_params", "fit_seconds", "simulate_seconds")
-_DECODER = msgspec.json.Decoder(Row)
+_DECODER = msgspec.json.Decoder(StoredRow)
 
 
 def decode(line: bytes, where: str) -> Result:

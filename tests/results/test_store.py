@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from simgap.records import Result, UnusableInput
 from simgap.results import store
-from simgap.results.decoding import Row, decode
+from simgap.results.decoding import StoredRow, decode
 
 RESULT = Result(
     model="arx", params={"na": 2}, dataset="tanks", experiment="test", task="free_run", seed=0,
@@ -107,7 +107,7 @@ def test_a_bad_line_is_refused_with_file_and_line(tmp_path, change, complaint):
 
 
 def test_the_fields_of_a_line_are_those_of_a_result():
-    assert list(Row.__struct_fields__) == [field.name for field in fields(Result)]
+    assert list(StoredRow.__struct_fields__) == [field.name for field in fields(Result)]
     defaults = Result("m", {}, "d", "e", "t", 0, "ok")
     assert decode(store.encode(defaults).encode(), "line 1") == defaults
 
