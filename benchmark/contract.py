@@ -203,25 +203,25 @@ CHECKS: tuple[Check, ...] = (
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What one check found; `wrong` is empty if all is well."""
+class CheckResult:
+    """The name of a check, and what is wrong; empty if all is well."""
 
     check: str
     wrong: str = ""
 
 
-def examine(candidate: Candidate) -> Iterator[Verdict]:
+def examine(candidate: Candidate) -> Iterator[CheckResult]:
     """Run the checks one after the other; a model that cannot even be fitted is not asked for more."""
     for check in CHECKS:
         sentence = check.__name__.replace("_", " ")
         try:
             check(candidate)
         except (ModelFault, UnusableInput) as error:
-            yield Verdict(sentence, str(error))
+            yield CheckResult(sentence, str(error))
             if "fitted" not in candidate.__dict__:
                 return
         else:
-            yield Verdict(sentence)
+            yield CheckResult(sentence)
 
 
 def _alike(found: np.ndarray, expected: np.ndarray, tolerance: float, otherwise: str) -> None:

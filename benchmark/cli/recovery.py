@@ -29,7 +29,7 @@ def run(rigs: list[str], seeds: int, engine: str, jobs: int, address: str | None
         raise UnusableInput(f"--seeds {seeds}: give at least one seed")
     console = Console()
     with shown(console, _summary) as listener:
-        results = recovery(Grid(tuple(rigs), seeds=seeds), Execution(engine, jobs, address, out, listener))
+        results = recovery(Grid(tuple(rigs), seeds=seeds), Execution(engine, jobs, {"address": address}, out, listener))
     rows = [asdict(result) for result in results]
     figures = confusion.summary(rows, [result.right for result in results])
     if json is not None:

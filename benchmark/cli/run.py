@@ -24,7 +24,7 @@ def run(
     datasets: Annotated[str | None, typer.Option(help="Only these data sets, names or paths: x,y.")] = None,
     seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
     jobs: Annotated[int, typer.Option(help="Number of jobs at a time on this machine.")] = 1,
-    engine: Annotated[str, typer.Option(help="Where the jobs run: local or ray.")] = "local",
+    engine: Annotated[str, typer.Option(help="Where the jobs run: local, ray, or one of your own.")] = "local",
     address: Annotated[str | None, typer.Option(help="Address of a Ray cluster.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results"),
     inputs: Inputs = None,

@@ -13,7 +13,7 @@ from typing import Literal
 from simgap.records import Result, UnusableInput
 from simgap.results import store
 
-Verdict = Literal["same", "better", "worse", "missing", "new"]
+Change = Literal["same", "better", "worse", "missing", "new"]
 
 # Share by which an RMSE may grow: of a model that computes, and of one whose numbers depend on the seed, where three
 # times the spread of its seeds counts if that is more.
@@ -24,7 +24,7 @@ SIGMAS = 3.0
 ROUNDING = 1e-9
 ON_AVERAGE = "on average"
 
-Name = tuple[str, str, str]  # experiment, task, and output with its horizon
+FigureName = tuple[str, str, str]  # experiment, task, and output with its horizon
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Comparison:
     before: float | None
     after: float | None
     limit: float
-    verdict: Verdict
+    verdict: Change
     why: str = ""
 
 
@@ -152,13 +152,13 @@ class _Group:
         self, figure: str, seed: int | None, before: float, after: float, limit: float, row: Result | None
     ) -> Comparison:
         margin = limit - before if math.isfinite(before) else 0.0
-        verdict: Verdict = "worse" if after > limit else "better" if after < before - margin else "same"
+        verdict: Change = "worse" if after > limit else "better" if after < before - margin else "same"
         why = row.message if row is not None and row.status != "ok" and verdict == "worse" else ""
         return self._comparison(figure, seed, before, after, limit, verdict, why)
 
     def _comparison(
         self, figure: str, seed: int | None, before: float | None, after: float | None, limit: float,
-        verdict: Verdict, why: str = "",
+        verdict: Change, why: str = "",
     ) -> Comparison:  # fmt: skip
         return Comparison(self.suite, self.model, self.dataset, figure, seed, before, after, limit, verdict, why)
 
@@ -169,9 +169,9 @@ class _Group:
         return next((row.provenance["stochastic"] is True for row in rows if "stochastic" in row.provenance), False)
 
     @cached_property
-    def _spread(self) -> dict[Name, float]:
+    def _spread(self) -> dict[FigureName, float]:
         """Standard deviation over the reference's seeds of each figure that has several and differs among them."""
-        values: dict[Name, list[float]] = {}
+        values: dict[FigureName, list[float]] = {}
         for row in self.before:
             for name, (value, _) in _figures(row).items():
                 if math.isfinite(value):
@@ -182,9 +182,9 @@ class _Group:
         }  # fmt: skip
 
 
-def _figures(row: Result) -> dict[Name, tuple[float, float]]:
+def _figures(row: Result) -> dict[FigureName, tuple[float, float]]:
     """Every RMSE of a row with the spread of what was measured: of the whole record, and at each horizon."""
-    found: dict[Name, tuple[float, float]] = {}
+    found: dict[FigureName, tuple[float, float]] = {}
     for output, figures in row.metrics.items():
         scale = float(figures.get("std", 0.0))
         if "rmse" in figures:

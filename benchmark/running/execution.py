@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 from simgap.records import UnusableInput
+from simgap.registry import ENGINES
 from simgap.running.engines.engine import Engine, Running, Work
-from simgap.running.engines.local import Local
-from simgap.running.workers import Limits, threads_per_worker
+from simgap.running.workers import Limits
 
 
 @dataclass(frozen=True)
@@ -39,41 +39,41 @@ def log_notes(progress: Progress) -> None:
 
 @dataclass(frozen=True)
 class Execution:
-    """Where work is done, how much of it at a time, the folder of its rows, and who hears how far it is."""
+    """Where work is done, how much of it at a time, the folder of its rows, and who hears how far it is.
+
+    `options` are those of some engines only, such as the address of a cluster; None for one that was not given.
+    """
 
     engine: str = "local"
     jobs: int = 1
-    address: str | None = None
+    options: dict[str, Any] = field(default_factory=dict)
     out: Path = Path("results")
     listener: Listener = log_notes
-
-    @property
-    def threads(self) -> int:
-        """Threads of one job: its share of this machine, one on a cluster."""
-        return threads_per_worker(self.jobs) if self.engine == "local" else 1
 
     def note(self, text: str) -> None:
         """Have the listener hear a sentence."""
         self.listener(Progress(note=text))
 
-    def start(self, timeout: float, memory: float) -> Engine:
-        """The engine with limits for each job, in seconds and GiB. Raises UnusableInput for one that cannot be used."""
+    @property
+    def threads(self) -> int:
+        """Threads of one job. Raises UnusableInput for an engine that is not known or no worker at all."""
         if self.jobs < 1:
             raise UnusableInput(f"--jobs {self.jobs}: give at least one worker")
+        return ENGINES[self.engine].threads(self.jobs)
+
+    def start(self, timeout: float, memory: float) -> Engine:
+        """The engine with limits for each job, in seconds and GiB. Raises UnusableInput for one that cannot be used."""
         # What an interrupted fit left to carry on from; gone with the fit.
         folders = {"SIMGAP_CHECKPOINTS": str(self.out.absolute() / ".checkpoints")}
         limits = Limits(self.threads, timeout, memory, folders)
-        if self.engine == "local":
-            if self.address is not None:
-                raise UnusableInput("--address is for --engine ray: the engine local needs none")
-            return Local(self.jobs, limits)
-        if self.engine != "ray":
-            raise UnusableInput(f"the engine {self.engine!r} is not known; choose local or ray")
-        from simgap.running.engines.ray import Cluster
-
-        if not (address := self.address or os.environ.get("RAY_ADDRESS")):
-            raise UnusableInput("--engine ray: say where the cluster is: --address HOST:PORT")
-        return Cluster(limits, address)
+        given = {name: value for name, value in self.options.items() if value is not None}
+        taken = signature(ENGINES[self.engine]).parameters
+        for name in given:
+            if name not in taken:
+                others = [other for other in ENGINES if not ENGINES.why_missing(other)]
+                where = " or ".join(other for other in others if name in signature(ENGINES[other]).parameters)
+                raise UnusableInput(f"--{name} is for --engine {where or '?'}: the engine {self.engine} takes none")
+        return ENGINES[self.engine](workers=self.jobs, limits=limits, **given)
 
 
 def carry_out(

@@ -27,8 +27,8 @@ SLOW_IMPORTS = {"torch": ("torch", "torch._dynamo", "safetensors.torch")}
 
 
 @dataclass(frozen=True)
-class Source:
-    """Where a data set comes from: the arguments of `simgap.load`."""
+class LoadArguments:
+    """How to load a data set: the arguments of `simgap.load`."""
 
     data: str
     inputs: tuple[str, ...] = ()
@@ -62,7 +62,7 @@ class Job:
     """One fit with all its simulations; `preload` are modules that are imported once for all jobs."""
 
     entry: Entry
-    source: Source
+    arguments: LoadArguments
     card: Card
     seed: int
     tasks: tuple[str, ...]
@@ -101,7 +101,7 @@ class Job:
     def execute(self) -> list[Result]:
         """Fit and score. Whatever the model does short of ending the process becomes rows."""
         try:
-            dataset = _load(self.source, self.card.sha256)
+            dataset = _load(self.arguments, self.card.sha256)
         except Exception as error:  # the file may have changed since the parent read it
             return self.failed("error", f"the data set could not be loaded again: {error}")
         if dataset.sha256 != self.card.sha256:
@@ -120,23 +120,23 @@ class Job:
         """The same job with absolute paths."""
         file, colon, name = self.entry.name.rpartition(":")
         entry = replace(self.entry, name=f"{Path(file).absolute()}:{name}") if colon else self.entry
-        data = Path(self.source.data)
-        source = replace(self.source, data=str(data.absolute())) if data.exists() else self.source
-        return replace(self, entry=entry, source=source)
+        data = Path(self.arguments.data)
+        arguments = replace(self.arguments, data=str(data.absolute())) if data.exists() else self.arguments
+        return replace(self, entry=entry, arguments=arguments)
 
     def has_its_code(self) -> bool:
         """Whether the model's code is that of the digest."""
         return model_code(self.entry).sha256() == self.provenance["model_sha256"]
 
 
-def _load(source: Source, sha256: str) -> Dataset:
+def _load(arguments: LoadArguments, sha256: str) -> Dataset:
     """The data, which may take seconds to make: the first job of a run leaves them for the others."""
     folder = shared_folder()
     if folder is None:
-        return source.load()
+        return arguments.load()
     file = Path(folder) / f"{sha256}.data"
     if not file.exists():
-        dataset = source.load()
+        dataset = arguments.load()
         partial = file.with_suffix(f".{os.getpid()}")
         with contextlib.suppress(OSError):  # a full disk must not end a fit
             partial.write_bytes(pickle.dumps(dataset))
@@ -148,9 +148,9 @@ def _load(source: Source, sha256: str) -> Dataset:
 def model_code(entry: Entry) -> Code:
     """The code of the model, and of the others that its parameters name, if they do. Raises UnusableInput."""
     kind = model_class(entry.name)
-    arguments = inspect.signature(kind).bind(**entry.params)
-    arguments.apply_defaults()
-    others = [text for text in _texts(arguments.arguments) if text in MODELS]
+    params = inspect.signature(kind).bind(**entry.params)
+    params.apply_defaults()
+    others = [text for text in _texts(params.arguments) if text in MODELS]
     return code_of([kind, *map(model_class, others)])
 
 

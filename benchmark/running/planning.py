@@ -12,7 +12,7 @@ from simgap.registry import DATASETS
 from simgap.results import store
 from simgap.results.store import plain
 from simgap.running.fitting import check_params
-from simgap.running.jobs import SLOW_IMPORTS, Card, Job, Source, model_code
+from simgap.running.jobs import SLOW_IMPORTS, Card, Job, LoadArguments, model_code
 from simgap.running.source import Code
 from simgap.running.suites import Entry, Suite
 
@@ -25,7 +25,7 @@ class Choice:
 
     models: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
-    sources: tuple[Source, ...] = ()
+    load_arguments: tuple[LoadArguments, ...] = ()
 
 
 def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
@@ -54,26 +54,28 @@ def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
     return entries
 
 
-def sources(datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None) -> list[Source]:
-    """Where the named data sets come from. Columns and dt go to the CSV files among them, if there are."""
+def load_arguments(
+    datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None
+) -> list[LoadArguments]:
+    """How to load the named data sets. Columns and dt go to the CSV files among them, if there are."""
     files = [name for name in datasets if Path(name).is_file()]
     return [
-        Source(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else Source(name)
+        LoadArguments(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else LoadArguments(name)
         for name in datasets
     ]
 
 
-def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple[Source, Card]]:
+def choose_data(suite: Suite, named: Sequence[LoadArguments], note: Note) -> list[tuple[LoadArguments, Card]]:
     """The data sets to run on, with their cards: those the user named, or else the suite's.
 
     One of the suite's that is not at hand is noted and left out; one the user named raises UnusableInput.
     """
     chosen = []
-    for source in named or [Source(name) for name in suite.datasets]:
+    for arguments in named or [LoadArguments(name) for name in suite.datasets]:
         try:
-            chosen.append((source, Card.of(source.load())))
+            chosen.append((arguments, Card.of(arguments.load())))
         except UnusableInput as error:
-            if named or source.data not in DATASETS:
+            if named or arguments.data not in DATASETS:
                 raise
             note(f"left out: {error}")
     names = [card.name for _, card in chosen]
@@ -85,7 +87,7 @@ def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple
 
 
 def plan(
-    suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[Source, Card]], provenance: dict[str, Any]
+    suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[LoadArguments, Card]], provenance: dict[str, Any]
 ) -> list[Job]:
     """All jobs, one data set after the other.
 
@@ -93,8 +95,10 @@ def plan(
     """
     codes = [model_code(entry) for entry in entries]
     return [
-        Job(entry, source, card, seed, suite.tasks, provenance | {"model_sha256": code.sha256()}, _slow_imports(code))
-        for source, card in data
+        Job(
+            entry, arguments, card, seed, suite.tasks, provenance | {"model_sha256": code.sha256()}, _slow_imports(code)
+        )
+        for arguments, card in data
         for seed in range(suite.seeds)
         for entry, code in zip(entries, codes, strict=True)
     ]

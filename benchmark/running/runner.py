@@ -34,12 +34,13 @@ def run(
 
     `models` are registered names or labels of the suite, `model` are `file.py:Class`; either replaces the
     suite's models, `datasets` (names or paths) its data sets. `inputs`, `outputs` and `dt` [s] tell how to
-    read CSV files. `jobs` is how many run at a time on this machine; with engine "ray" they go to the Ray cluster
-    at `address` instead. What is stored for the same data is not computed again. Raises UnusableInput.
+    read CSV files. `jobs` is how many run at a time on this machine; `engine` is a registered one: "ray" hands
+    them to the Ray cluster at `address` instead. What is stored for the same data and code is not computed again.
+    Raises UnusableInput.
     """
-    files = planning.sources(_listed(datasets), _listed(inputs), _listed(outputs), dt)
+    files = planning.load_arguments(_listed(datasets), _listed(inputs), _listed(outputs), dt)
     choice = Choice(tuple(_listed(models)), tuple(_listed(model)), tuple(files))
-    execution = Execution(engine, jobs, address, Path(out), progress or log_notes)
+    execution = Execution(engine, jobs, {"address": address}, Path(out), progress or log_notes)
     return run_suite(planning.with_seeds(load_suite(suite), seeds), choice, execution)
 
 
@@ -47,7 +48,7 @@ def run_suite(suite: Suite, choice: Choice, execution: Execution) -> list[Result
     """Run those of a suite's jobs that the user chose and that are not stored. Raises UnusableInput."""
     engine = execution.start(suite.timeout, suite.memory)
     entries = planning.choose_entries(suite, choice, execution.note)
-    data = planning.choose_data(suite, choice.sources, execution.note)
+    data = planning.choose_data(suite, choice.load_arguments, execution.note)
     planned = planning.plan(suite, entries, data, provenance(execution.threads))
     folder = store.writable(execution.out)
     results, todo = _split(planned, planning.stored_rows(planned, folder, suite))

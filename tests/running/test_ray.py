@@ -83,7 +83,7 @@ def test_the_cases_of_the_recovery_study_run_on_a_cluster_as_on_one_machine(tmp_
     grid = Grid(rigs=("cart",), seeds=0, pairs=1, clean=1)
     alone = recovery(grid, Execution(out=tmp_path / "here"))
     with cluster({"num_cpus": 1}) as (nodes, _):
-        spread = recovery(grid, Execution("ray", address=nodes.address, out=tmp_path / "there"))
+        spread = recovery(grid, Execution("ray", options={"address": nodes.address}, out=tmp_path / "there"))
     assert [replace(row, seconds=0.0) for row in spread] == [replace(row, seconds=0.0) for row in alone]
     (row,) = engine._on_a_node(CaseJob(alone[0].case, "0" * 64), Limits(1))
     assert "another version of the code" in row.message

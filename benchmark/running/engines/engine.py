@@ -56,7 +56,9 @@ class Running:
 Event = list[Any] | tuple[Running, ...]
 
 
-# Executes work, each in a process of its own; closing the generator stops what is under way.
+# Executes work, each in a process of its own; closing the generator stops what is under way. What is registered in
+# ENGINES makes one: a class with the fields `workers`, `limits` and its own options, called like this, and with the
+# static method `threads(workers)`, the threads of one job.
 Engine = Callable[[Sequence[Work]], Generator[Event, None, None]]
 
 

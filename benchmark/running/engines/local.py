@@ -17,8 +17,9 @@ from typing import Any
 from pebble import CONSTS, ProcessExpired, ProcessPool
 
 from simgap.protocol import listen
+from simgap.registry import ENGINES
 from simgap.running.engines.engine import Event, Running, Work, note_progress, noted_share, shared_folder
-from simgap.running.workers import Limits, prepare_worker
+from simgap.running.workers import Limits, prepare_worker, threads_per_worker
 
 # Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
 # changed since, and a job imports them in milliseconds.
@@ -34,12 +35,18 @@ PRELOADED = (
 CONSTS.sleep_unit = 0.02
 
 
+@ENGINES.register("local")
 @dataclass(frozen=True)
 class Local:
-    """At most `workers` pieces of work at a time."""
+    """This machine: at most `workers` pieces of work at a time, each in a process of its own."""
 
     workers: int
     limits: Limits
+
+    @staticmethod
+    def threads(workers: int) -> int:
+        """Each worker's share of the machine."""
+        return threads_per_worker(workers)
 
     def __call__(self, todo: Sequence[Work]) -> Generator[Event, None, None]:
         """Rows and what is under way; see Engine."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap.records import UnusableInput
+from simgap.registry import ENGINES
 from simgap.running.engines.engine import Event, Work
 from simgap.running.engines.local import Local
 from simgap.running.workers import Limits
@@ -23,18 +24,24 @@ PATIENCE = 10.0  # seconds, for an answer of the cluster
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
+@ENGINES.register("ray")
 @dataclass(frozen=True)
 class Cluster:
-    """As many jobs at a time as the cluster at `address` has processors and, where models ask for them, GPUs.
+    """A Ray cluster: as many jobs at a time as it has processors and, where models ask for them, GPUs.
 
-    Every node needs simgap and the same files under the same names. Raises UnusableInput when there is no cluster.
+    `workers` is ignored. `address` is that of the cluster, or in RAY_ADDRESS. Every node needs simgap and the same
+    files under the same names. Raises UnusableInput, before any work is done, when Ray is missing or nobody answers.
     """
 
+    workers: int
     limits: Limits
-    address: str
+    address: str = ""
 
     def __post_init__(self) -> None:
-        """Raises UnusableInput, before any work is done, when Ray is missing or nobody answers at the address."""
+        if not self.address:
+            object.__setattr__(self, "address", os.environ.get("RAY_ADDRESS", ""))
+        if not self.address:
+            raise UnusableInput("--engine ray: say where the cluster is: --address HOST:PORT")
         try:
             import ray  # type: ignore[import-not-found]  # noqa: F401
         except ImportError as error:
@@ -45,6 +52,11 @@ class Cluster:
                 socket.create_connection((host, int(port)), timeout=PATIENCE).close()
             except (OSError, ValueError) as error:
                 raise UnusableInput(f"--engine ray: there is no cluster at {self.address}: {error}") from error
+
+    @staticmethod
+    def threads(workers: int) -> int:
+        """One processor for each job."""
+        return 1
 
     def __call__(self, todo: Sequence[Work]) -> Generator[Event, None, None]:
         """Rows as they come; what is under way is Ray's to tell."""
