@@ -12,7 +12,7 @@ from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
 from simgap.error_views.wording import amount, between, number, off, percent, rate, span
-from simgap.findings import Wrong
+from simgap.findings import ViewName, Wrong
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
 
@@ -123,7 +123,7 @@ def band(e: Errors) -> Iterator[Wrong]:
 
 
 def _by_mean(
-    e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
+    e: Errors, view: ViewName, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
 ) -> Wrong:
     of_sample = group[e.experiment]
     mean = np.bincount(of_sample, e.error) / np.bincount(of_sample)
@@ -137,7 +137,7 @@ def _by_mean(
 
 
 def _by_size(
-    e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
+    e: Errors, view: ViewName, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
 ) -> Wrong:
     of_sample = group[e.experiment]
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -19,7 +20,7 @@ from simgap.error_views.variables import (
     derivative,
 )
 from simgap.error_views.wording import off, percent, rate
-from simgap.findings import Wrong
+from simgap.findings import ViewName, Wrong
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
 
@@ -57,44 +58,52 @@ def _views_of_output(e: Errors, output: int) -> Iterator[Wrong]:
         return  # a constant has no other sides
     for trend in (trends.time_since_start, trends.drift, trends.experiments, trends.band):
         yield from trend(e)
-    for view, unit, bins in (*_by_input(e), *_by_motion(e, output)):
-        if bins is not None:
-            yield _binned(e, view, unit, bins)
+    for variable in (*_inputs(e), *_motion(e, output)):
+        if variable.bins is not None:
+            yield _binned(e, variable, variable.bins)
 
 
-def _by_input(e: Errors) -> Iterator[tuple[str, str, Bins | None]]:
+class _Variable(NamedTuple):
+    """A variable that the error is held against, in the view of that name."""
+
+    view: ViewName
+    unit: str
+    bins: Bins | None
+    channel: str = ""  # of the variable, unless it is the output itself
+
+
+def _inputs(e: Errors) -> Iterator[_Variable]:
     for i, channel in enumerate(e.channels.inputs):
-        name = f"input {channel.name}"
-        yield name, channel.unit, bin_values(e.u[:, i], name, channel.unit)
+        bins = bin_values(e.u[:, i], f"input {channel.name}", channel.unit)
+        yield _Variable("input", channel.unit, bins, channel.name)
 
 
-def _by_motion(e: Errors, output: int) -> Iterator[tuple[str, str, Bins | None]]:
-    """Velocity, position and the like, of the simulated output: what they are depends on its kind."""
-    own, unit, name = e.y_hat[:, output], e.channel.unit, e.channel.name
-    change = by_experiment(lambda part: derivative(part, e.dt), own, e.lengths)
-    amplitudes = by_experiment(amplitude, own, e.lengths)
-    yield "amplitude", unit, bin_values(amplitudes, f"local RMS of simulated {name}", unit)
-    if e.channel.kind in ("level", "other"):
-        value = "level" if e.channel.kind == "level" else "value"
-        yield value, unit, bin_values(own, f"simulated {name}", unit)
-        yield "rate of change", rate(unit), bin_values(change, "rate of change", rate(unit))
+def _motion(e: Errors, output: int) -> Iterator[_Variable]:
+    """List the variables of motion that an output of this kind tells, as simulated."""
+    y_hat, kind, unit, name = e.y_hat[:, output], e.channel.kind, e.channel.unit, e.channel.name
+    slope = by_experiment(lambda part: derivative(part, e.dt), y_hat, e.lengths)
+    amplitudes = by_experiment(amplitude, y_hat, e.lengths)
+    yield _Variable("amplitude", unit, bin_values(amplitudes, f"local RMS of simulated {name}", unit))
+    if kind in ("level", "other"):
+        yield _Variable("level" if kind == "level" else "value", unit, bin_values(y_hat, f"simulated {name}", unit))
+        yield _Variable("rate of change", rate(unit), bin_values(slope, "rate of change", rate(unit)))
         return
-    if e.channel.kind == "position":
-        v, v_unit = change, rate(unit)
-        yield "position", unit, bin_values(own, "position", unit)
+    if kind == "position":
+        v, v_unit = slope, rate(unit)
+        yield _Variable("position", unit, bin_values(y_hat, "position", unit))
     else:
-        v, v_unit = own, unit
+        v, v_unit = y_hat, unit
         for i, other in enumerate(e.channels.outputs):
             if other.kind == "position":
-                place = f"position {other.name}"
-                yield place, other.unit, bin_values(e.y_hat[:, i], place, other.unit)
-    yield "velocity", v_unit, bin_values(v, "velocity", v_unit)
-    yield "sign of velocity", "", bin_direction(v, unit)
-    yield "time since reversal", "s", bin_reversals(v, e.lengths, e.dt, unit)
+                bins = bin_values(e.y_hat[:, i], f"position {other.name}", other.unit)
+                yield _Variable("position", other.unit, bins, other.name)
+    yield _Variable("velocity", v_unit, bin_values(v, "velocity", v_unit))
+    yield _Variable("sign of velocity", "", bin_direction(v, unit))
+    yield _Variable("time since reversal", "s", bin_reversals(v, e.lengths, e.dt, unit))
 
 
-def _binned(e: Errors, view: str, unit: str, bins: Bins) -> Wrong:
-    """The view of the mean error in bins. Where bins have parents, what they add to the means of the parents."""
+def _binned(e: Errors, variable: _Variable, bins: Bins) -> Wrong:
+    """Compute the mean error in bins; where bins have parents, their share is what they add to the parents' means."""
     n = len(bins.centres)
     parents = np.array(bins.parents or [0] * n)
     share, p = chance.by_bins(e.error, bins.labels, e.lengths, e.seed, bins.parents)
@@ -108,7 +117,8 @@ def _binned(e: Errors, view: str, unit: str, bins: Bins) -> Wrong:
         f"{off(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
         f"{', beyond what the direction explains' if bins.parents else ''}."
     )
-    return Wrong(view, name, share, p, text, bins.centres, tuple(map(float, mean)), unit)
+    error = tuple(map(float, mean))
+    return Wrong(variable.view, name, share, p, text, bins.centres, error, variable.unit, variable.channel)
 
 
 def _extremes(mean: Float[np.ndarray, " B"], count: np.ndarray, parents: np.ndarray) -> tuple[int, int]:

@@ -1,10 +1,18 @@
 """Every effect of the catalogue: its texts, its bounds, and its term against rigs that were integrated elsewhere."""
 
+from functools import cache
+from itertools import permutations
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from simgap.data.simulated.rigs import hide, physical, suitable
+from simgap.error_views.views import views
+from simgap.findings import VIEWS_OF_KINDS, ViewName
 from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.evidence import separation
+from simgap.records import Channel, Channels, Experiment, Kind
 from simgap.registry import EFFECTS, MODELS
 
 CATALOGUE = {
@@ -42,6 +50,56 @@ def test_effects_that_may_be_confused_come_with_the_experiment_that_separates_th
     for other, experiment in EFFECTS[name].confounders.items():
         assert other in CATALOGUE and other != name
         assert len(experiment) > 20
+
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+def applies_to(name, kind):
+    """Whether an effect is ever tried on an output of this kind that has no negative readings."""
+    return EFFECTS[name]().applies_to(scales(kind, order=1 if kind == "velocity" else 2, y_low=-0.1))
+
+
+@cache
+def seen_on(kind):
+    """The names of all views of an output of this kind: six experiments of two kinds, and an error of noise."""
+    rng = np.random.default_rng(0)
+    experiments, simulated = [], []
+    for i in range(6):
+        u = rng.normal(size=(300, 1))
+        y_hat = np.cumsum(u, axis=0)
+        y = y_hat + rng.normal(size=u.shape)
+        experiments.append(Experiment(f"{i}_{('steps', 'sine')[i % 2]}", u, y, 0.1))
+        simulated.append(y_hat[5:])
+    return {
+        view.view for view in views(experiments, simulated, Channels((Channel("u"),), (Channel("y", "", kind),)), 5)
+    }
+
+
+@pytest.mark.parametrize("name", EFFECTS.names())
+def test_every_view_that_an_effect_names_is_one_that_an_error_has(name):
+    assert set(EFFECTS[name].shows_in) <= set().union(*map(seen_on, KINDS))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", EFFECTS.names())
+def test_an_effect_shows_in_some_view_of_every_output_that_it_is_tried_on(name, kind):
+    assert set(EFFECTS[name].shows_in) & seen_on(kind) or not applies_to(name, kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_output_has_the_views_of_its_kind(kind):
+    assert seen_on(kind) == {view for view in get_args(ViewName) if kind in VIEWS_OF_KINDS.get(view, (kind,))}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_two_effects_come_with_an_experiment_that_tells_them_apart(kind):
+    simulated = [name for name in EFFECTS.names() if EFFECTS[name].simulated and applies_to(name, kind)]
+    for effect, other in permutations((EFFECTS[name]() for name in simulated), 2):
+        apart = separation(effect, other, kind)
+        assert len(apart.experiment) > 20
+        if "second sensor:" in apart.experiment:  # which tells nothing about two effects on the same side of it
+            assert (effect.port == "output") != (other.port == "output"), (effect.name, other.name)
 
 
 @pytest.mark.parametrize("kind", ["position", "velocity", "level", "other"])

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -25,9 +26,12 @@ class AbsoluteSensor(OutputEffect):
     moves_poles: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 120
     hides_sign: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "position")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "position", "value", "level")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_saturation": "move slowly through zero: a saturated reading stays there, a rectified one bounces",
+        "quantisation": (
+            "move slowly: a coarse reading jumps from step to step everywhere, a rectified one turns back at zero"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

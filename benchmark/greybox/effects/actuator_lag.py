@@ -8,6 +8,7 @@ from typing import ClassVar, final
 import numpy as np
 from scipy.signal import lfilter
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -38,14 +39,16 @@ class ActuatorLag(InputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
     place_in_chain: ClassVar[int] = 70
     linear: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
-        "input_delay": "apply a step and sample fast: a lag starts at once, after a delay nothing moves at first; "
-        "a short hold "
-        "of the input excites the high frequencies that tell them apart",
-        "sensor_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a "
-        "machine that "
-        "is otherwise linear: they are the same transfer function",
+        "input_delay": (
+            "apply a step and sample fast: a lag starts at once, after a delay nothing moves at first; a short hold "
+            "of the input excites the high frequencies that tell them apart"
+        ),
+        "sensor_lag": (
+            "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a machine that "
+            "is otherwise linear: they are the same transfer function"
+        ),
         "backlash": "repeat a slow triangle at half the speed: a lag fades, play stays as wide",
     }
     substeps: ClassVar[int] = 4

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,14 +25,22 @@ class AsymmetricGain(InputEffect):
     )
     reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
     place_in_chain: ClassVar[int] = 30
-    shows_in: ClassVar[tuple[str, ...]] = ("input", "sign of velocity")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "sign of velocity")
     confounders: ClassVar[dict[str, str]] = {
-        "constant_load": "let it run without input: a load still moves it; and compare steps up and down of "
-        "several sizes: "
-        "an unequal gain errs in proportion to the step, a load by the same amount",
-        "quadratic_stiffness": "hold constant inputs of several sizes both ways: an unequal gain gives two "
-        "straight lines",
+        "constant_load": (
+            "let it run without input: a load still moves it; and compare steps up and down of several sizes: an "
+            "unequal gain errs in proportion to the step, a load by the same amount"
+        ),
+        "quadratic_stiffness": (
+            "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines"
+        ),
         "sensor_bias": "record at rest without input: a bias is still there",
+        "dead_zone": "hold small constant inputs of both signs: inside a dead zone nothing moves either way",
+        "input_saturation": (
+            "hold constant inputs up to the largest: saturation ends the growth at one value of the input, an unequal "
+            "gain does not"
+        ),
+        "backlash": "move in one direction without reversing: an unequal gain still errs, play does not",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -25,13 +26,15 @@ class Backlash(InputEffect):
         "Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002, sec. 2"
     )
     place_in_chain: ClassVar[int] = 60
-    shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "input")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "input")
     confounders: ClassVar[dict[str, str]] = {
-        "hysteresis": "trace slow loops of several sizes: play has straight flanks and a flat top, hysteresis is "
-        "rounded",
-        "input_delay": "repeat a slow triangle at half the speed: a delay keeps its seconds, play keeps its width "
-        "in units of "
-        "the input",
+        "hysteresis": (
+            "trace slow loops of several sizes: play has straight flanks and a flat top, hysteresis is rounded"
+        ),
+        "input_delay": (
+            "repeat a slow triangle at half the speed: a delay keeps its seconds, play keeps its width in units of "
+            "the input"
+        ),
         "actuator_lag": "repeat a slow triangle at half the speed: a lag fades, play stays as wide",
         "coulomb_friction": "stop and start in the same direction: play shows only after a reversal",
         "dead_zone": "reverse the input slowly far from zero: a dead zone acts around zero only",

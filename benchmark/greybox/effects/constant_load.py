@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -21,10 +22,12 @@ class ConstantLoad(ForceEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 4"
     role: ClassVar[Role] = "force"
     linear: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "time")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("offset", "position", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
-        "asymmetric_gain": "let it run without input, and compare steps up and down of several sizes: a load errs "
-        "by the same amount each time",
+        "asymmetric_gain": (
+            "let it run without input, and compare steps up and down of several sizes: a load errs by the same amount "
+            "each time"
+        ),
         "sensor_bias": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
         "quadratic_stiffness": "hold it at several positions: a load is the same at all of them",
         "sensor_drift": "record for longer: a drift goes on growing",

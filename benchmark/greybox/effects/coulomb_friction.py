@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,12 +25,15 @@ class CoulombFriction(ForceEffect):
         "friction, Automatica 30, 1994"
     )
     role: ClassVar[Role] = "friction"
-    shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "velocity", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
     confounders: ClassVar[dict[str, str]] = {
-        "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts "
-        "to move",
-        "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead "
-        "zone takes its share of the input only near zero",
+        "stribeck_friction": (
+            "creep through zero very slowly: with Stribeck friction the force falls as it starts to move"
+        ),
+        "dead_zone": (
+            "drive it at constant speed and change the input a little: friction keeps its force, a dead zone takes "
+            "its share of the input only near zero"
+        ),
         "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
         "quadratic_drag": "run at two constant speeds, one twice the other: dry friction costs the same at both",
         "backlash": "stop and start again in the same direction: friction sticks, play is already taken up",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -21,12 +22,17 @@ class CubicStiffness(ForceEffect):
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "position_torque": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
-        "input_saturation": "hold constant inputs up to the largest: saturation ends the growth at one value of "
-        "the input",
+        "input_saturation": (
+            "hold constant inputs up to the largest: saturation ends the growth at one value of the input"
+        ),
         "quadratic_drag": "hold it at rest away from the middle: a spring still pulls, drag does not",
+        "quadratic_stiffness": (
+            "hold it equally far from the middle on both sides: a cubic spring pulls back on both, a quadratic one "
+            "pulls the same way on both"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -25,14 +26,20 @@ class DeadZone(InputEffect):
         "Tao and Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996, ch. 2"
     )
     place_in_chain: ClassVar[int] = 40
-    shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "coulomb_friction": "drive it at constant speed with slowly rising input in one direction only: friction "
-        "keeps its "
-        "force while it moves, a dead zone acts on the input alone; then brake without input and watch the stop",
+        "coulomb_friction": (
+            "drive it at constant speed with slowly rising input in one direction only: friction keeps its force "
+            "while it moves, a dead zone acts on the input alone; then brake without input and watch the stop"
+        ),
         "backlash": "reverse the input slowly with large and small strokes: play shows only after a reversal",
-        "quadratic_drag": "hold several constant inputs: the steady output over the input is a kinked line for a "
-        "dead zone",
+        "quadratic_drag": (
+            "hold several constant inputs: the steady output over the input is a kinked line for a dead zone"
+        ),
+        "input_saturation": (
+            "raise a constant input step by step: a dead zone takes the same amount from every input, saturation "
+            "takes only from the largest"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

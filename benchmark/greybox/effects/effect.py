@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.records import Kind
 
 Port = Literal["input", "force", "output"]
@@ -98,8 +99,8 @@ class Effect(ABC):
     explanation: ClassVar[str]
     reference: ClassVar[str]
     port: ClassVar[Port]
-    # The views of the error that show it, most telling first: their names in `simgap.error_views`.
-    shows_in: ClassVar[tuple[str, ...]] = ()
+    # The views of the error that show it, the most telling first.
+    shows_in: ClassVar[tuple[ViewName, ...]] = ()
     # Effects that the data may not separate from this one, and the experiment that would.
     confounders: ClassVar[dict[str, str]] = {}
     # Simpler effects that this one contains as a special case; it takes their place in a model.

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,7 +25,7 @@ class GainFade(InputEffect):
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
     place_in_chain: ClassVar[int] = 20
-    shows_in: ClassVar[tuple[str, ...]] = ("first against second half", "time")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record at rest without input: a drift is still there, a fading gain is not",
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -22,11 +23,16 @@ class Hysteresis(ForceEffect):
     )
     reference: ClassVar[str] = "Bouc 1967, Wen 1976; Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("time since reversal", "sign of velocity")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "sign of velocity", "rate of change")
     confounders: ClassVar[dict[str, str]] = {
         "backlash": "trace slow loops of several sizes: hysteresis is rounded, play has straight flanks and a flat top",
         "coulomb_friction": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
         "stribeck_friction": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
+        "actuator_lag": "repeat a slow triangle at half the speed: a lag fades, hysteresis stays as wide",
+        "sensor_lag": "repeat a slow triangle at half the speed: a lag fades, hysteresis stays as wide",
+        "input_delay": (
+            "repeat a slow triangle at half the speed: the loop of a delay gets narrower, hysteresis stays as wide"
+        ),
     }
     memory: ClassVar[int] = 1
 

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -25,11 +26,12 @@ class InputDelay(InputEffect):
     place_in_chain: ClassVar[int] = 10
     linear: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
-        "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; "
-        "a short "
-        "hold of the input excites the high frequencies that tell them apart",
+        "actuator_lag": (
+            "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; a short hold "
+            "of the input excites the high frequencies that tell them apart"
+        ),
         "sensor_lag": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
     }
     substeps: ClassVar[int] = 4

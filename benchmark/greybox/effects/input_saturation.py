@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -22,14 +23,17 @@ class InputSaturation(InputEffect):
     )
     reference: ClassVar[str] = "Hippe, Windup in Control, 2006, ch. 1"
     place_in_chain: ClassVar[int] = 50
-    shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "quadratic_drag": "hold constant inputs up to the largest: with saturation the steady output stops growing "
-        "at once, "
-        "with drag it bends",
+        "quadratic_drag": (
+            "hold constant inputs up to the largest: with saturation the steady output stops growing at once, with "
+            "drag it bends"
+        ),
         "sensor_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "cubic_stiffness": "hold constant inputs up to the largest: saturation ends the growth at one value of the "
-        "input",
+        "cubic_stiffness": (
+            "hold constant inputs up to the largest: saturation ends the growth at one value of the input"
+        ),
+        "backlash": "keep the input well below its largest value: play is still there, saturation is not",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

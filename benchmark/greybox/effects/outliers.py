@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,7 +24,7 @@ class Outliers(OutputEffect):
     reference: ClassVar[str] = "Huber and Ronchetti, Robust Statistics, 2009, ch. 1"
     place_in_chain: ClassVar[int] = 150
     simulated: ClassVar[bool] = False
-    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("size by experiment",)
     confounders: ClassVar[dict[str, str]] = {}
     per_experiment: ClassVar[bool] = True
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,14 +25,16 @@ class Overflow(ForceEffect):
     role: ClassVar[Role] = "rim"
     moves_poles: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("level", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "sensor_saturation": "watch how it comes back from the limit: an overflow leaves it at once, a saturated "
-        "sensor only when "
-        "the level is back in range",
+        "sensor_saturation": (
+            "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor only when the "
+            "level is back in range"
+        ),
         "sqrt_outflow": "fill it slowly past the largest level: only an overflow stops the rise",
-        "input_saturation": "raise the largest input step by step: an overflow stops the level, however slowly it "
-        "is filled",
+        "input_saturation": (
+            "raise the largest input step by step: an overflow stops the level, however slowly it is filled"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

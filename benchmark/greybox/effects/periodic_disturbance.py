@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,10 +25,13 @@ class PeriodicDisturbance(ForceEffect):
         "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"
     )
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("frequency band", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "position_torque": "move at another speed: a disturbance in time keeps its frequency",
         "sensor_drift": "record for longer: a drift does not come back",
+        "actuator_lag": "record without any input: a disturbance goes on, a lag has nothing to act on",
+        "sensor_lag": "record without any input: a disturbance goes on, a lag has nothing to act on",
+        "input_delay": "record without any input: a disturbance goes on, a delay has nothing to act on",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -25,7 +26,7 @@ class PositionTorque(ForceEffect):
         "Energy Conversion 18, 2003"
     )
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value")
     confounders: ClassVar[dict[str, str]] = {
         "cubic_stiffness": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
         "periodic_disturbance": "move at another speed: a torque over position changes its frequency in time",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -21,13 +22,23 @@ class QuadraticDrag(ForceEffect):
     )
     reference: ClassVar[str] = "Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, ch. 6"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("velocity", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("velocity", "rate of change", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "run at two constant speeds, one twice the other: drag costs four times as much",
-        "input_saturation": "hold constant inputs up to the largest: with drag the steady speed bends, with "
-        "saturation it stops growing at once",
-        "dead_zone": "hold several constant inputs: the steady output over the input is curved for drag, kinked "
-        "for a dead zone",
+        "input_saturation": (
+            "hold constant inputs up to the largest: with drag the steady speed bends, with saturation it stops "
+            "growing at once"
+        ),
+        "dead_zone": (
+            "hold several constant inputs: the steady output over the input is curved for drag, kinked for a dead zone"
+        ),
+        "stribeck_friction": (
+            "run at several constant speeds: drag grows with the square of the speed, Stribeck friction falls with it"
+        ),
+        "hysteresis": (
+            "run at two constant speeds, one twice the other: drag costs four times as much, a hysteretic force costs "
+            "the same"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

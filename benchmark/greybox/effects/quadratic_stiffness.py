@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -21,7 +22,7 @@ class QuadraticStiffness(ForceEffect):
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "constant_load": "hold it at several positions: a load is the same at all of them",
         "asymmetric_gain": "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines",

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -20,7 +21,7 @@ class Quantisation(OutputEffect):
     explanation: ClassVar[str] = "The reading comes in steps: few counts of an encoder, few bits of a converter."
     reference: ClassVar[str] = "Widrow and Kollar, Quantization Noise, 2008, ch. 4"
     place_in_chain: ClassVar[int] = 140
-    shows_in: ClassVar[tuple[str, ...]] = ("position",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level")
     confounders: ClassVar[dict[str, str]] = {}
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,7 +24,7 @@ class SensorBias(OutputEffect):
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     time_power: ClassVar[int | None] = 0
-    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
         "constant_load": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
         "sensor_drift": "record for longer: a drift goes on growing",

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,7 +24,7 @@ class SensorDrift(OutputEffect):
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     time_power: ClassVar[int | None] = 1
-    shows_in: ClassVar[tuple[str, ...]] = ("time", "first against second half")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since the start", "drift within experiment")
     confounders: ClassVar[dict[str, str]] = {
         "gain_fade": "record at rest without input: a drift is still there",
         "constant_load": "record for longer: a drift goes on growing",

@@ -7,6 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 from scipy.signal import lfilter
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,11 +25,14 @@ class SensorLag(OutputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
     place_in_chain: ClassVar[int] = 110
     linear: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
-        "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in "
-        "a machine that is otherwise linear: they are the same transfer function",
+        "actuator_lag": (
+            "only a second sensor, or measuring what arrives from the actuator, tells the two apart in a machine that "
+            "is otherwise linear: they are the same transfer function"
+        ),
         "input_delay": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
+        "backlash": "repeat a slow triangle at half the speed: a lag fades, play stays as wide",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -20,12 +21,18 @@ class SensorSaturation(OutputEffect):
     explanation: ClassVar[str] = "Beyond its range the sensor shows its last value while the machine goes on moving."
     reference: ClassVar[str] = "Tao and Kokotovic, 1996, ch. 2"
     place_in_chain: ClassVar[int] = 130
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "input_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "overflow": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor "
-        "only when the level is back in range",
+        "overflow": (
+            "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor only when the "
+            "level is back in range"
+        ),
         "absolute_sensor": "move slowly through zero",
+        "quantisation": (
+            "move slowly: a coarse reading jumps from step to step everywhere, a saturated one stands still beyond "
+            "its limit"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,7 +24,7 @@ class SqrtOutflow(ForceEffect):
     role: ClassVar[Role] = "outflow"
     moves_poles: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("level", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "overflow": "fill it slowly past the largest level: only an overflow stops the rise",
         "sensor_saturation": "empty it through a measured drain: a saturated reading stays while the level falls",

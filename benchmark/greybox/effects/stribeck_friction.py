@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,12 +24,14 @@ class StribeckFriction(ForceEffect):
     reference: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, sec. 2"
     role: ClassVar[Role] = "friction"
     contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
-    shows_in: ClassVar[tuple[str, ...]] = ("velocity", "sign of velocity")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("velocity", "rate of change", "sign of velocity")
     confounders: ClassVar[dict[str, str]] = {
-        "coulomb_friction": "creep through zero very slowly: with Coulomb friction alone the force does not fall "
-        "as it starts to move",
-        "dead_zone": "drive it at constant speed and change the input a little: a dead zone acts around zero input "
-        "only",
+        "coulomb_friction": (
+            "creep through zero very slowly: with Coulomb friction alone the force does not fall as it starts to move"
+        ),
+        "dead_zone": (
+            "drive it at constant speed and change the input a little: a dead zone acts around zero input only"
+        ),
         "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
     }
 
