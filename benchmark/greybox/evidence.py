@@ -214,9 +214,7 @@ def separation(effect: Effect, other: Effect, kind: Kind) -> Separation:
     """
     experiment = effect.confounders.get(other.name) or other.confounders.get(effect.name)
     if not experiment:
-        view, of_other = (
-            next(view for view in one.shows_in if kind in VIEWS_OF_KINDS.get(view, (kind,))) for one in (effect, other)
-        )
+        view, of_other = most_telling(effect, kind), most_telling(other, kind)
         experiment = (
             f"vary the amplitude and the speed of the input more: an error that {ERROR_THAT[view]} then speaks for "
             f"{effect.title}, one that {ERROR_THAT[of_other]} for {other.title}"
@@ -225,6 +223,11 @@ def separation(effect: Effect, other: Effect, kind: Kind) -> Separation:
             of_sensor = effect if effect.port == "output" else other
             experiment = f"add a second sensor: only {of_sensor.title} makes the two readings differ"
     return Separation(other.name, other.title, experiment)
+
+
+def most_telling(effect: Effect, kind: Kind) -> ViewName:
+    """Return the first view that shows an effect among those of an output of this kind."""
+    return next(view for view in effect.shows_in if kind in VIEWS_OF_KINDS.get(view, (kind,)))
 
 
 def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

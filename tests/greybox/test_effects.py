@@ -24,12 +24,12 @@ CATALOGUE = {
 
 
 def scales(kind="position", **changes):
-    sizes = dict(
+    signals = dict(
         kind=kind, order=2, dt=0.1, duration=30.0, u_low=-2.0, u_high=2.0, u_rms=1.0, y_low=-3.0, y_high=3.0,
         y_rms=1.0, x_max=3.0, v_max=4.0, stroke=3.0, force_rms=5.0, u_unit="V", y_unit="mm", lines=(0.5,),
         quantisation_step=0.1,
     )  # fmt: skip
-    return SignalScales(**(sizes | changes))
+    return SignalScales(**(signals | changes))
 
 
 def test_the_catalogue_is_complete():
@@ -50,6 +50,7 @@ def test_effects_that_may_be_confused_come_with_the_experiment_that_separates_th
     for other, experiment in EFFECTS[name].confounders.items():
         assert other in CATALOGUE and other != name
         assert len(experiment) > 20
+        assert name not in EFFECTS[other].confounders, "both files know the pair"
 
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -105,11 +106,11 @@ def test_any_two_effects_come_with_an_experiment_that_tells_them_apart(kind):
 @pytest.mark.parametrize("kind", ["position", "velocity", "level", "other"])
 @pytest.mark.parametrize("name", EFFECTS.names())
 def test_every_start_lies_within_the_bounds(name, kind):
-    effect, here = EFFECTS[name](), scales(kind, order=1 if kind == "velocity" else 2)
-    parameters = effect.parameters(here)
+    effect, sizes = EFFECTS[name](), scales(kind, order=1 if kind == "velocity" else 2)
+    parameters = effect.parameters(sizes)
     for parameter in parameters:
         assert parameter.low <= parameter.high
-    for start in effect.starts(here):
+    for start in effect.starts(sizes):
         assert len(start.values) == len(parameters)
         for value, parameter in zip(start.values, parameters, strict=True):
             assert parameter.low <= value <= parameter.high, parameter.name
@@ -126,9 +127,9 @@ def test_every_start_lies_within_the_bounds(name, kind):
     ],
 )
 def test_units_follow_from_what_the_output_measures(kind, unit, order, force, rate):
-    here = scales(kind, order=order, y_unit=unit)
-    assert here.force_unit == force
-    assert here.velocity_unit == rate
+    sizes = scales(kind, order=order, y_unit=unit)
+    assert sizes.force_unit == force
+    assert sizes.velocity_unit == rate
 
 
 # What a rig calls the size of an effect is the first number of the effect, but for these.
@@ -150,11 +151,11 @@ def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
     fitted = model.plants[0]
     y = fitted.records.y[fitted.records.mask]
     # A start on the wrong side of zero is not always corrected.
-    left = 0.03 if effect == "absolute_sensor" else 0.01
-    assert np.std(fitted.estimate.errors) < left * np.std(y)
+    unexplained = 0.03 if effect == "absolute_sensor" else 0.01
+    assert np.std(fitted.estimate.errors) < unexplained * np.std(y)
     if effect in NO_SIZE:
         return
     plant = fitted.estimate.plant
-    found = fitted.estimate.theta[plant.part_of(plant.terms[0])]
+    estimated = fitted.estimate.theta[plant.part_of(plant.terms[0])]
     size = SIZE.get(effect, lambda size, _: size)(physical(rig, {effect: 1.0})[effect], dataset)
-    assert abs(found[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)
+    assert abs(estimated[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)
