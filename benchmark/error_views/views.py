@@ -1,4 +1,4 @@
-"""What a free-run simulation gets wrong: its error, seen the ways a control engineer looks at it."""
+"""All views of the error of a free run: against time, experiments, frequency, input and motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
 
 NEGLIGIBLE = 1e-12  # an error this much smaller than the signal is rounding
-SMALLEST = 1e-150  # whose square is still a float
+SMALLEST = 1e-150  # an error whose square is still a float
 
 
 def views(
@@ -35,27 +35,27 @@ def views(
     n_init: int,
     seed: int = 0,
 ) -> list[Wrong]:
-    """Every view of the error e = y - y_hat of every output, the one that explains most first.
+    """View the error e = y - y_hat of every output in every way; the view that explains most comes first.
 
-    `simulated[i]` [T - n_init, ny] holds rows n_init .. T-1 of the free run of `experiments[i]`. All views are
-    returned, also those that chance explains: keep those with chance < 0.01, or less where many are looked at.
-    Shares overlap and do not add up to 1, because the variables of a motion depend on each other. A simulation that
-    diverged is left out; an output without error has no views.
+    `simulated[i]` [T - n_init, ny] holds rows n_init .. T-1 of the free run of `experiments[i]`. Views that chance
+    explains are returned too: keep those with chance < 0.01, or less where many are looked at. Shares do not add up
+    to 1, because the variables of a motion depend on each other. A simulation that diverged is left out; an output
+    without error has no views.
     """
     pairs = [(x, y_hat) for x, y_hat in zip(experiments, simulated, strict=True) if len(y_hat) and is_finite(y_hat)]
-    found: list[Wrong] = []
+    seen: list[Wrong] = []
     for output in range(len(channels.outputs) if pairs else 0):
         e = errors(pairs, channels, output, n_init, seed)
         size = np.abs(e.y_hat[:, output] + e.error).max()
         if np.abs(e.error).max() > max(NEGLIGIBLE * size, SMALLEST):
-            found += _views_of_output(e, output)
-    return sorted(found, key=lambda view: -view.share)
+            seen += _views_of_output(e, output)
+    return sorted(seen, key=lambda view: -view.share)
 
 
 def _views_of_output(e: Errors, output: int) -> Iterator[Wrong]:
     yield from trends.offset(e)
     if np.ptp(e.error) <= 1e-9 * np.abs(e.error).max():
-        return  # a constant has no other sides
+        return  # a constant error depends on nothing
     for trend in (trends.time_since_start, trends.drift, trends.experiments, trends.band):
         yield from trend(e)
     for variable in (*_inputs(e), *_motion(e, output)):
@@ -122,8 +122,8 @@ def _binned(e: Errors, variable: _Variable, bins: Bins) -> Wrong:
 
 
 def _extremes(mean: Float[np.ndarray, " B"], count: np.ndarray, parents: np.ndarray) -> tuple[int, int]:
-    """The bins with the highest and lowest mean, both of the parent within which the means differ most."""
+    """Find the bins with the highest and the lowest mean, within the parent whose bins differ most."""
     of_parent = (np.bincount(parents, count * mean) / np.bincount(parents, count))[parents]
     inner = np.bincount(parents, count * (mean - of_parent) ** 2)
-    among = np.flatnonzero(parents == np.argmax(inner))
-    return int(among[np.argmax(mean[among])]), int(among[np.argmin(mean[among])])
+    bins = np.flatnonzero(parents == np.argmax(inner))
+    return int(bins[np.argmax(mean[bins])]), int(bins[np.argmin(mean[bins])])
