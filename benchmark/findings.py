@@ -8,7 +8,41 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from simgap.records import Kind
+
 Verdict = Literal["named", "nothing_found", "unexplained"]
+
+# What a simulation error is plotted against. An effect lists under these names the views that show it.
+ViewName = Literal[
+    "offset",
+    "time since the start",
+    "drift within experiment",
+    "experiment",
+    "size by experiment",
+    "kind of experiment",
+    "size by kind of experiment",
+    "frequency band",
+    "input",
+    "amplitude",
+    "position",
+    "level",
+    "value",
+    "velocity",
+    "rate of change",
+    "sign of velocity",
+    "time since reversal",
+]
+# Views of outputs of certain kinds; every output has the others. A velocity also has the view "position" where a
+# position is measured beside it.
+VIEWS_OF_KINDS: dict[ViewName, tuple[Kind, ...]] = {
+    "position": ("position",),
+    "level": ("level",),
+    "value": ("other",),
+    "velocity": ("position", "velocity"),
+    "rate of change": ("level", "other"),
+    "sign of velocity": ("position", "velocity"),
+    "time since reversal": ("position", "velocity"),
+}
 
 
 @dataclass(frozen=True)
@@ -26,6 +60,7 @@ class Value:
 class Wrong:
     """One view of what a simulation gets wrong: of the error y - y_hat of one output.
 
+    `channel` is the input or the other output that the error is held against, in the views that have one.
     `share` is the part of the mean squared error that the mean errors of the view's bins (or its strongest band)
     explain beyond chance; `chance` is how often chance alone explains as much (p-value, for this view by itself).
     `text` says it in a sentence. For plots: `at` holds the bins' centres, in `unit`, and `error` the mean errors
@@ -34,7 +69,7 @@ class Wrong:
     is at 0; directions are -1 (back), 0 (rest) and 1 (forwards).
     """
 
-    view: str
+    view: ViewName
     output: str
     share: float
     chance: float
@@ -42,6 +77,12 @@ class Wrong:
     at: tuple[float, ...]
     error: tuple[float, ...]
     unit: str
+    channel: str = ""
+
+    @property
+    def label(self) -> str:
+        """The view with its channel: "velocity", "input u"."""
+        return f"{self.view} {self.channel}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -82,7 +123,7 @@ class Cause:
     parameters: tuple[Value, ...]
     per_experiment: bool = False
     confounded_with: tuple[Separation, ...] = ()
-    shows_in: tuple[str, ...] = ()
+    shows_in: tuple[ViewName, ...] = ()
     profiles: tuple[Profile, ...] = ()
 
 
@@ -148,7 +189,7 @@ class Findings:
             "verdict": self.verdict,
             "baseline": self.baseline,
             "wrong": [
-                {"view": w.view, "output": w.output, "share": w.share, "chance": w.chance, "text": w.text}
+                {"view": w.label, "output": w.output, "share": w.share, "chance": w.chance, "text": w.text}
                 for w in self.wrong
             ],
             "causes": [

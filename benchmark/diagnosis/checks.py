@@ -1,4 +1,4 @@
-"""What the records themselves show before any model is fitted."""
+"""Checks of the data that need no model."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import numpy as np
 
 from simgap.records import Dataset
 
-SHORT = 200  # samples in training below which little can be told
+SHORT = 200  # training samples; with fewer, weak effects do not stand out from noise
 
 
 def look(dataset: Dataset) -> tuple[str, ...]:
-    """One sentence for each thing about the training data that a reader of the answer should know."""
+    """Check the training data; return a sentence for whatever limits what a diagnosis can find in them."""
     training = dataset.training
     sentences = []
     samples = sum(map(len, training.train))
     if samples < SHORT:
-        sentences.append(f"Only {samples} training samples: weak effects cannot be told from noise.")
+        sentences.append(f"There are only {samples} training samples: weak effects cannot be told from noise.")
     if not training.valid:
         sentences.append("There are no validation data: effects were accepted on the training data alone.")
     if len(training.train) == 1:
         sentences.append(
-            "One training experiment: a drift of the sensor cannot be told from a slow change of the plant."
+            "There is one training experiment: a drift of the sensor cannot be told from a slow change of the plant."
         )
     for i, channel in enumerate(dataset.channels.outputs):
         y = np.concatenate([x.y[:, i] for x in training.train])
@@ -28,14 +28,17 @@ def look(dataset: Dataset) -> tuple[str, ...]:
             times = int(np.sum(y == limit))
             if times > max(5, 0.005 * len(y)) and np.ptp(y) > 0:
                 sentences.append(
-                    f"{channel.name} reads its {word} value, {limit:.4g} {channel.unit}".rstrip()
-                    + f", {times} times: something ends there."
+                    f"{channel.name} stands at its {word} value, {limit:.4g} {channel.unit}".rstrip()
+                    + f", in {times} samples: the machine or the sensor may have a limit there."
                 )
         values = np.unique(y)
         if 3 <= len(values) < 0.05 * len(y) and len(values) < 500:
-            sentences.append(f"{channel.name} takes only {len(values)} different values: its reading is coarse.")
+            sentences.append(f"{channel.name} takes only {len(values)} different values: its resolution is coarse.")
     for i, channel in enumerate(dataset.channels.inputs):
         u = np.concatenate([x.u[:, i] for x in training.train])
         if u.min() >= 0 or u.max() <= 0:
-            sentences.append(f"The input {channel.name} never changes its sign: effects around zero cannot show.")
+            sentences.append(
+                f"The input {channel.name} never changes its sign: what happens around zero input, such as a dead "
+                "zone, cannot show."
+            )
     return tuple(sentences)

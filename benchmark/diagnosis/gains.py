@@ -1,4 +1,4 @@
-"""What the causes gain on test data, with an interval from resampling."""
+"""The free-run error on test data without and with the causes, and the interval of the gain."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from simgap.findings import Gain
 from simgap.greybox.model import GreyBoxModel
 from simgap.records import Dataset, Experiment
 
-RESAMPLED = 2000
-BLOCKS = 20  # of a single test experiment
+RESAMPLED = 2000  # draws
+BLOCKS = 20  # that a single test experiment is cut into
 
 
 def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
@@ -21,26 +21,29 @@ def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[
 
 
 def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray], seed: int) -> Gain:
-    """RMSE before and after per output; share = 1 - |after| / |before| over all outputs, each in units of its spread.
+    """Compare the errors of two simulations of the test experiments, before and after the causes were added.
 
-    The 95 % interval resamples test experiments, or blocks where there is one (Efron and Tibshirani 1993, ch. 8, 13).
+        share = 1 - |e_after| / |e_before|,   over all outputs, each divided by its standard deviation
+
+    The 95 % interval comes from the bootstrap over test experiments, or over blocks of a single one (Efron and
+    Tibshirani 1993, ch. 8 and 13).
     """
     n = dataset.n_init
     y = [x.y[n:] for x in dataset.test]
     spread = np.std(np.concatenate(y), axis=0)
     spread = np.where(spread > 0, spread, 1.0)
     squares = []  # per block: samples, squared errors before [ny] and after [ny]
-    for measured, b, a in zip(y, before, after, strict=True):
+    for measured, *simulated in zip(y, before, after, strict=True):
         for rows in np.array_split(np.arange(len(measured)), BLOCKS if len(y) == 1 else 1):
             if len(rows):
-                errors = [np.sum(((measured[rows] - s[rows]) / spread) ** 2, axis=0) for s in (b, a)]
+                errors = [np.sum(((measured[rows] - y_hat[rows]) / spread) ** 2, axis=0) for y_hat in simulated]
                 squares.append([np.full(len(spread), float(len(rows))), *errors])
-    table = np.array(squares)  # [block, 3, ny]
+    blocks = np.array(squares)  # [block, 3, ny]
     rng = np.random.default_rng(seed)
-    drawn = table[rng.integers(0, len(table), (RESAMPLED, len(table)))].sum(axis=1)  # [draw, 3, ny]
+    drawn = blocks[rng.integers(0, len(blocks), (RESAMPLED, len(blocks)))].sum(axis=1)  # [draw, 3, ny]
     shares = _share(drawn)
     low, high = np.quantile(shares, (0.025, 0.975))
-    total = table.sum(axis=0)
+    total = blocks.sum(axis=0)
     rmse = np.sqrt(total[1:] / total[0]) * spread  # [2, ny]
     names = [channel.name for channel in dataset.channels.outputs]
     return Gain(
@@ -52,6 +55,6 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     )
 
 
-def _share(table: Float[np.ndarray, "B 3 ny"]) -> Float[np.ndarray, " B"]:
-    before, after = table[:, 1].sum(axis=1), table[:, 2].sum(axis=1)
+def _share(squares: Float[np.ndarray, "B 3 ny"]) -> Float[np.ndarray, " B"]:
+    before, after = squares[:, 1].sum(axis=1), squares[:, 2].sum(axis=1)
     return 1 - np.sqrt(after / np.maximum(before, 1e-300))

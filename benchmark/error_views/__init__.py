@@ -1,1 +1,1 @@
-"""The error of a free run, seen the ways a control engineer looks at it."""
+"""Views of a simulation error: what the error of a free run depends on, and how sure that is."""

@@ -1,7 +1,7 @@
-"""How much of an error a grouping of its samples explains, and how often chance alone explains as much.
+"""Significance of a view: the share of the squared error that it explains, and how often chance explains as much.
 
-A simulation error is autocorrelated (drift, coloured noise, slow dynamics), so the F test for independent samples sees
-an effect in almost everything. Each test here keeps the correlation of the error.
+A simulation error is autocorrelated (drift, coloured noise, slow dynamics), so that the F test for independent samples
+finds almost everything significant. Each test in this file allows for the correlation of the error.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from scipy.stats import beta, f
 from simgap.error_views.correlation import correlation_time, means
 
 DRAWS = 1000  # of random signs
-LARGE = 256  # terms that get them one by one
-SHUFFLES = 200  # of blocks
+LARGE = 256  # terms whose signs are drawn one by one
+SHUFFLES = 200  # of the blocks over the groups
 
 
 def by_bins(
@@ -27,20 +27,21 @@ def by_bins(
     seed: int,
     parents: Sequence[int] = (),
 ) -> tuple[float, float]:
-    """Share of the mean square that the means of bins explain beyond chance, and how often chance gives as much.
+    """Compute the share of the squared error that the means of bins explain beyond chance, and its p-value.
 
-    Q = sum_b n_b (m_b - m)^2 with m_b the mean error [unit of the error] of bin b. Experiments of `lengths` samples
-    stand one after the other; samples labelled -1 are in no bin. `parents` names a coarser bin for every bin: then m
-    is the mean of the parent, and only what the finer bins add counts.
+        Q = sum_b n_b (m_b - m)^2,   m_b the mean error of bin b, n_b its samples
 
-    Chance: in each experiment the error is taken apart into cosines and each cosine gets a random sign. That keeps
-    its spectrum, as random circular shifts do, and loses its relation to the bins. But a record of N samples and
-    correlation time tau has no more than N/tau different shifts, and a ramp tears where it wraps: on a single record
-    of 200 samples of AR(1) noise with a pole at 0.9, shifts took chance for an effect in 5 % of cases at the 1 % level.
-    With c_k the cosine coefficients of the error and i_k those of the bins' indicators, signs s_k turn the bin sums
-    into S = sum_k s_k c_k i_k, and Q = S'AS, so no signal has to be put together again.
-    Cosines decorrelate noise with a pole near 1: Ahmed, Natarajan, Rao, IEEE Trans. Comput. C-23 (1974) 90. Random
-    phases, the relative of random signs: Theiler et al., Physica D 58 (1992) 77.
+    Experiments of `lengths` samples stand end to end; samples labelled -1 are in no bin. `parents` names a coarser bin
+    for every bin: then m is the mean of the parent, and only what the finer bins add counts.
+
+    The p-value compares Q with surrogates of the error: the cosine transform of each experiment with a random sign
+    for every coefficient. They have the spectrum of the error and no relation to the bins. Random circular shifts have
+    that too, but a record of N samples and correlation time tau has no more than N/tau different ones, and a ramp
+    gets a jump where it wraps: on single records of 200 samples of AR(1) noise with a pole at 0.9, shifts found an
+    effect in 5 % of cases at the 1 % level. With c_k the cosine coefficients of the error and i_k those of the bins'
+    indicators, signs s_k turn the bin sums into S = sum_k s_k c_k i_k, and Q = S'AS: no surrogate is transformed back.
+    Cosines decorrelate noise with a pole near 1: Ahmed, Natarajan, Rao, IEEE Trans. Comput. C-23 (1974) 90. Surrogates
+    with random phases: Theiler et al., Physica D 58 (1992) 77.
     """
     indicator = (labels[:, None] == np.arange(labels.max() + 1)).astype(float)  # [N, B]
     count = indicator.sum(axis=0)  # [B]
@@ -62,10 +63,10 @@ def by_bins(
 
 
 def _random_sums(terms: Float[np.ndarray, "N B"], rng: np.random.Generator) -> Float[np.ndarray, "draws B"]:
-    """sum_k s_k terms_k under random signs: exact for the largest terms, normal with the same covariance for the rest.
+    """Draw sum_k s_k terms_k for random signs s_k: the largest terms exactly, the rest from the normal distribution.
 
-    A few large terms are far from normal (their sum is bounded), and they are what an effect consists of: taken for
-    normal, they would hide it in a short record.
+    The normal distribution has the covariance of the rest. The sum of a few large terms is bounded and far from
+    normal, and a real effect consists of such terms: drawn as normal, they would hide it in a short record.
     """
     size = (terms**2).sum(axis=1)
     order = np.argsort(-size)
@@ -83,18 +84,20 @@ def by_trend(
     removed: int,
     experiment: Int[np.ndarray, " N"],
 ) -> tuple[float, float]:
-    """The same for what is slow itself: `fitted` holds means of whole experiments or stretches of time, or lines.
+    """Compute the share of the squared error that a slow trend explains beyond chance, and the p-value of its F test.
 
-    F = (Q / p) / (tau R / (N - tau q)), with Q = |fitted|^2, R what is left, p = `added` the degrees of freedom of
-    `fitted`, q = `removed` those plus what was taken out before, and tau the correlation time of what
-    is left [samples]. Random signs would keep a slow trend slow and call every trend chance. Here the trend is the
-    question, so chance is noise with the correlation that remains once the trend is gone.
+        F = (Q / p) / (tau R / (N - tau q)),   Q = |fitted|^2,   R = |error - fitted|^2
+
+    `fitted` holds means of whole experiments or of stretches of time, or straight lines; p = `added` are its degrees of
+    freedom, q = `removed` those and the ones removed before, tau is the correlation time of the residual in samples.
+    Surrogates with random signs are as slow as the trend, so that no trend would be significant; the F test compares
+    the trend with noise that has the correlation of the residual.
     """
-    left = error - fitted
-    # Offsets of experiments are a view of their own; left in, they would pass for correlation within each of them.
-    left = left - means(left, experiment)
-    tau, reach = correlation_time(left, np.bincount(experiment), removed)
-    total, rest = float(error @ error), float(left @ left)
+    residual = error - fitted
+    # Offsets of experiments are a view of their own; in the residual they would look like correlation.
+    residual = residual - means(residual, experiment)
+    tau, reach = correlation_time(residual, np.bincount(experiment), removed)
+    total, rest = float(error @ error), float(residual @ residual)
     free = len(error) / tau - removed
     if added < 1 or free < 1 or rest <= 0:
         return 0.0, 1.0
@@ -107,9 +110,10 @@ def by_trend(
 def by_experiments(
     error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"], kind: Int[np.ndarray, " E"], about: float
 ) -> tuple[float, float]:
-    """The same for the means of kinds of experiments [E] about the value `about`.
+    """Compute the share that the mean errors of kinds of experiments explain beyond chance, and the p-value.
 
-    The experiments are the independent samples of the F test, since each may have an offset of its own.
+    `kind` [E] says which kind each experiment is of; the means are taken about the value `about`. The experiments are
+    the independent samples of the F test, because each may have an offset of its own.
     """
     count = np.bincount(experiment)  # [E]
     mean = np.bincount(experiment, error) / count  # [E]
@@ -125,24 +129,25 @@ def by_experiments(
 
 
 def by_size(size: Float[np.ndarray, " n"], group: Int[np.ndarray, " n"], seed: int) -> tuple[float, float]:
-    """Part of the squared error that groups hold above their part of the blocks, beyond chance, and its chance.
+    """Compute how much more of the squared error some groups hold than their share of the blocks, and the p-value.
 
-    D = sum_g max(0, s_g / s - n_g / n), with s_g the sum of the mean squares `size` of the blocks in `group` g.
-    Chance deals the blocks anew to the groups.
+        D = sum_g max(0, s_g / s - n_g / n),   s_g the sum of the mean squares `size` of the n_g blocks of group g
+
+    A permutation test: the blocks are distributed anew over the groups.
     """
-    deals = np.random.default_rng(seed).permuted(np.tile(size, (SHUFFLES, 1)), axis=1)
-    deals = np.vstack([size, deals])  # [1 + SHUFFLES, n], the first as it was
+    permuted = np.random.default_rng(seed).permuted(np.tile(size, (SHUFFLES, 1)), axis=1)
+    permuted = np.vstack([size, permuted])  # [1 + SHUFFLES, n], the first as it was measured
     member = (group[:, None] == np.arange(group.max() + 1)).astype(float)  # [n, G]
-    excess = np.maximum(0, deals @ member / size.sum() - member.mean(axis=0)).sum(axis=1)
-    chance = np.mean(excess >= excess[0] * (1 - 1e-9))  # its own deal included
+    excess = np.maximum(0, permuted @ member / size.sum() - member.mean(axis=0)).sum(axis=1)
+    chance = np.mean(excess >= excess[0] * (1 - 1e-9))  # including the measured one
     return beyond(float(excess[0]), float(excess[1:].mean()), 1.0), float(chance)
 
 
 def by_bands(power: Float[np.ndarray, " F"], band: Int[np.ndarray, " F"]) -> tuple[int, float, float]:
-    """The band that holds most of the power above its width, the share above its width, and its chance in white noise.
+    """Find the frequency band with the most power beyond that of white noise: its index, that share, and its p-value.
 
-    For white noise the power of the n_b lines of band b, as a part of all n, is Beta(n_b, n - n_b); the p-value counts
-    the number of bands that were looked at (Bonferroni).
+    In white noise the power of the n_b lines of band b, as a part of all n, is Beta(n_b, n - n_b); the p-value is
+    multiplied by the number of bands (Bonferroni).
     """
     lines = np.bincount(band)
     part = np.bincount(band, power) / power.sum()
@@ -156,11 +161,11 @@ def by_bands(power: Float[np.ndarray, " F"], band: Int[np.ndarray, " F"]) -> tup
 
 
 def cosines(columns: Float[np.ndarray, "N m"], lengths: Sequence[int]) -> Float[np.ndarray, "N m"]:
-    """Orthonormal cosine transform of each column, experiment by experiment."""
+    """Transform each column by the orthonormal cosine transform, experiment by experiment."""
     parts = np.split(columns, np.cumsum(lengths)[:-1])
     return np.concatenate([np.asarray(dct(part, axis=0, norm="ortho")) for part in parts])
 
 
 def beyond(explained: float, expected: float, total: float) -> float:
-    """Share of `total` explained, corrected for what chance explains: (explained - expected) / (total - expected)."""
+    """Correct a share for what chance explains: (explained - expected) / (total - expected), within 0 and 1."""
     return min(1.0, max(0.0, (explained - expected) / (total - expected))) if total > expected else 0.0

@@ -1,4 +1,4 @@
-"""How long an error remembers: the samples that count as one, and blocks longer than that."""
+"""Autocorrelation of an error: how many samples count as one, and blocks that are longer."""
 
 from __future__ import annotations
 
@@ -10,26 +10,27 @@ from scipy.fft import next_fast_len
 
 
 def correlation_time(
-    left: Float[np.ndarray, " N"], lengths: Sequence[int] | np.ndarray, removed: int
+    error: Float[np.ndarray, " N"], lengths: Sequence[int] | np.ndarray, removed: int
 ) -> tuple[float, int]:
-    """Samples that count as one: tau = 1 + 2 sum_k rho_k up to the first rho_k that is not positive, at least 1.
+    """Estimate how many samples count as one, and the lag at which the autocorrelation rho_k first reaches zero.
 
-    `removed` means were taken out of `left`. That lowers every autocovariance by about removed tau / N of the
-    variance, which is put back; without it slow noise looks faster than it is.
+    tau = 1 + 2 sum_k rho_k over the lags k below that, at least 1. `removed` means were taken out of the error, which
+    lowers every autocovariance by about removed tau / N of the variance; that is put back, because slow noise would
+    look faster than it is.
     """
-    total, kept = np.zeros(max(lengths)), np.zeros(max(lengths))
-    for part in np.split(left, np.cumsum(lengths)[:-1]):
+    products, count = np.zeros(max(lengths)), np.zeros(max(lengths))  # per lag
+    for part in np.split(error, np.cumsum(lengths)[:-1]):
         n = len(part)
         padded = next_fast_len(2 * n, real=True)
-        total[:n] += np.fft.irfft(np.abs(np.fft.rfft(part, padded)) ** 2, padded)[:n]
-        kept[:n] += n - np.arange(n)
+        products[:n] += np.fft.irfft(np.abs(np.fft.rfft(part, padded)) ** 2, padded)[:n]
+        count[:n] += n - np.arange(n)
     longest = max(2, int(max(lengths)) // 2)
-    covariance = total[:longest] / kept[:longest]
+    covariance = products[:longest] / count[:longest]
     if covariance[0] <= 0:
         return 1.0, 1
     tau, reach = 1.0, 1
     for _ in range(10):
-        share = min(removed * tau / len(left), 0.9)
+        share = min(removed * tau / len(error), 0.9)
         rho = (covariance / covariance[0]) * (1 - share) + share
         reach = int(np.argmax(rho <= 0)) if np.any(rho <= 0) else len(rho)
         tau = max(1.0, 1 + 2 * float(rho[1:reach].sum()))
@@ -37,7 +38,7 @@ def correlation_time(
 
 
 def blocks(error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"]) -> tuple[np.ndarray, np.ndarray]:
-    """Mean squares of blocks of each experiment, longer than their correlation, and the experiment of each block."""
+    """Cut each experiment into blocks longer than its correlation; return their mean squares and their experiments."""
     squared, lengths = error**2 / np.mean(error**2), np.bincount(experiment)
     reach = correlation_time(squared - means(squared, experiment), lengths, len(lengths))[1]
     whole = [part[: len(part) // (2 * reach) * 2 * reach] for part in np.split(squared, np.cumsum(lengths)[:-1])]
@@ -46,5 +47,5 @@ def blocks(error: Float[np.ndarray, " N"], experiment: Int[np.ndarray, " N"]) ->
 
 
 def means(values: Float[np.ndarray, " N"], labels: Int[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-    """The mean of each sample's group, at each sample."""
+    """Return for each sample the mean over the samples with the same label."""
     return (np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))[labels]

@@ -1,4 +1,4 @@
-"""The error of one output over all experiments, as the views of it need it."""
+"""The simulation error of one output, with all experiments end to end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from simgap.records import Channel, Channels, Experiment
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """What the simulation of one output gets wrong: N samples of E experiments, end to end, from n_init on."""
+    """The error y - y_hat of one output: N samples of E experiments, each from n_init on, end to end."""
 
     channel: Channel
     error: Float[np.ndarray, " N"]  # y - y_hat
@@ -25,21 +25,21 @@ class Errors:
     channels: Channels
     seed: int
     experiment: Int[np.ndarray, " N"] = field(init=False)
-    sample: Int[np.ndarray, " N"] = field(init=False)  # since the start of the simulation
+    sample: Int[np.ndarray, " N"] = field(init=False)  # counted from the start of its simulation
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "experiment", np.repeat(np.arange(len(self.lengths)), self.lengths))
         object.__setattr__(self, "sample", np.concatenate([np.arange(n) for n in self.lengths]))
 
     def parts(self) -> list[Float[np.ndarray, " T"]]:
-        """Split the error into that of each experiment."""
+        """Split the error by experiment."""
         return np.split(self.error, np.cumsum(self.lengths)[:-1])
 
 
 def errors(
     pairs: Sequence[tuple[Experiment, np.ndarray]], channels: Channels, output: int, n_init: int, seed: int
 ) -> Errors:
-    """Line up the error of one output over experiments and their simulations [T - n_init, ny]."""
+    """Collect the error of one output from pairs of an experiment and its simulation [T - n_init, ny]."""
     y_hat = np.concatenate([simulated for _, simulated in pairs])
     y, u = (np.concatenate([getattr(x, column)[n_init:] for x, _ in pairs]) for column in ("y", "u"))
     return Errors(

@@ -1,4 +1,4 @@
-"""Views of an error by what is slow or discrete: offset, time, experiments, and frequency bands."""
+"""Views of an error against time, over experiments, and in frequency bands."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
 from simgap.error_views.wording import between, error, mean_error, rate, span
-from simgap.findings import Wrong
+from simgap.findings import ViewName, Wrong
 from simgap.wording import amount, number, percent
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
 
 
 def offset(e: Errors) -> Iterator[Wrong]:
-    """The mean error: a bias of the sensor, a constant load, a wrong operating point."""
+    """View the mean error, as a sensor bias, a constant load or a wrong operating point leave it."""
     mean = float(e.error.mean())
     n = len(e.lengths)
     if np.ptp(e.error) <= 1e-9 * abs(mean):  # no noise to measure it against
@@ -33,9 +33,9 @@ def offset(e: Errors) -> Iterator[Wrong]:
 
 
 def time_since_start(e: Errors) -> Iterator[Wrong]:
-    """The mean error by the time since the start, and how the RMS error grows."""
+    """View the mean error against the time since the start, and how the RMS error grows."""
     unit, seconds = e.channel.unit, e.sample * e.dt
-    # Few experiments of slow noise wander like a trend; many bins would also take away what shows how slow it is.
+    # Slow noise in few experiments looks like a trend, and many bins would remove what shows how slow it is.
     bins = bin_values(seconds, "time", "s", min(10, 1 + 2 * len(e.lengths)))
     if bins is None:
         return
@@ -54,12 +54,12 @@ def time_since_start(e: Errors) -> Iterator[Wrong]:
 
 
 def drift(e: Errors) -> Iterator[Wrong]:
-    """A straight line in each experiment, with a slope of its own; shown as the means of its halves."""
+    """View the drift: a straight line with a slope of its own in each experiment, shown as the means of its halves."""
     lengths, name, unit = np.array(e.lengths), e.channel.name, e.channel.unit
     if lengths.min() < 8:
         return
     count = len(lengths)
-    time = (e.sample - (lengths[e.experiment] - 1) / 2) * e.dt  # about the middle of each experiment
+    time = (e.sample - (lengths[e.experiment] - 1) / 2) * e.dt  # s, from the middle of each experiment
     slope = np.bincount(e.experiment, time * e.error) / np.bincount(e.experiment, time**2)  # [E]
     share, p = chance.by_trend(e.error, time * slope[e.experiment], count, 2 * count, e.experiment)
     half = 2 * e.experiment + (2 * e.sample >= lengths[e.experiment])
@@ -76,32 +76,31 @@ def drift(e: Errors) -> Iterator[Wrong]:
 
 
 def experiments(e: Errors) -> Iterator[Wrong]:
-    """The mean and the size of the error by experiment, and by kind of experiment."""
+    """View the mean and the RMS error over experiments, and over kinds of experiments (the ends of their names)."""
     names, count = e.names, len(e.names)
     if count < 2:
         return
     fitted = means(e.error, e.experiment) - e.error.mean()
-    found = chance.by_trend(e.error, fitted, count - 1, count, e.experiment)
-    everyone = np.arange(count)
-    yield _by_mean(e, "experiment", names, everyone, *found)
+    each = np.arange(count)
+    yield _by_mean(e, "experiment", names, each, *chance.by_trend(e.error, fitted, count - 1, count, e.experiment))
     sizes, owner = blocks(e.error, e.experiment)
     if np.bincount(owner, minlength=count).min() > 1:
-        yield _by_size(e, "size by experiment", names, everyone, *chance.by_size(sizes, owner, e.seed))
+        yield _by_size(e, "size by experiment", names, each, *chance.by_size(sizes, owner, e.seed))
     suffixes = [name.rsplit("_", 1)[-1] if "_" in name else "" for name in names]
     kinds, kind = np.unique(suffixes, return_inverse=True)
     if all(map(str.isalpha, kinds)) and np.count_nonzero(np.bincount(kind) > 1) > 1:
         labels = tuple(f"experiments of kind {name}" for name in kinds)
-        found = chance.by_experiments(e.error, e.experiment, kind, float(e.error.mean()))
-        yield _by_mean(e, "kind of experiment", labels, kind, *found)
+        share, p = chance.by_experiments(e.error, e.experiment, kind, float(e.error.mean()))
+        yield _by_mean(e, "kind of experiment", labels, kind, share, p)
         sizes = np.bincount(e.experiment, e.error**2) / np.array(e.lengths)
         yield _by_size(e, "size by kind of experiment", labels, kind, *chance.by_size(sizes, kind, e.seed))
 
 
 def band(e: Errors) -> Iterator[Wrong]:
-    """The octave below the Nyquist frequency that holds most of the error's power."""
+    """View the power of the error in octaves below the Nyquist frequency."""
     nyquist, name = 0.5 / e.dt, e.channel.name
     centred = [part - part.mean() for part in e.parts()]
-    # The mean of each experiment has a view of its own: the line at zero frequency is left out.
+    # The line at zero frequency is left out: the mean of each experiment has a view of its own.
     power = np.concatenate([np.abs(np.fft.rfft(part)[1:]) ** 2 / len(part) for part in centred])
     frequency = np.concatenate([np.arange(1, len(part) // 2 + 1) / (len(part) / 2) for part in centred])
     label = np.searchsorted(OCTAVES, frequency * (1 - 1e-12))
@@ -115,7 +114,7 @@ def band(e: Errors) -> Iterator[Wrong]:
     share = min(1.0, share * variance / float(np.mean(e.error**2)))
     text = (
         f"The error of {name} is strongest {place} ({number(low, 2)} to {number(high, 2)} of the Nyquist frequency): "
-        f"{_squared(share)}, beyond what white noise has there."
+        f"{_squared(share)}, beyond what white noise would have there."
     )
     filled = np.unique(label)
     rms = np.sqrt(np.bincount(label, power)[filled] / power.sum() * variance)
@@ -124,7 +123,7 @@ def band(e: Errors) -> Iterator[Wrong]:
 
 
 def _by_mean(
-    e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
+    e: Errors, view: ViewName, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
 ) -> Wrong:
     of_sample = group[e.experiment]
     mean = np.bincount(of_sample, e.error) / np.bincount(of_sample)
@@ -138,7 +137,7 @@ def _by_mean(
 
 
 def _by_size(
-    e: Errors, view: str, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
+    e: Errors, view: ViewName, labels: tuple[str, ...], group: Int[np.ndarray, " E"], share: float, p: float
 ) -> Wrong:
     of_sample = group[e.experiment]
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)
@@ -147,7 +146,7 @@ def _by_size(
     most, least = error(rms[high], e.channel.unit), error(rms[low], e.channel.unit)
     text = (
         f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
-        f"those above the average hold {percent(share)} of the squared error beyond their part."
+        f"those above the average hold {percent(share)} more of the squared error than their share of the samples."
     )
     return Wrong(view, e.channel.name, share, p, text, _counted(rms), _floats(rms), "")
 

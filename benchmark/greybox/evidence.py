@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from simgap.findings import Cause, Profile, Separation, Value
+from simgap.findings import VIEWS_OF_KINDS, Cause, Profile, Separation, Value, ViewName
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.effects.outliers import Outliers as OutlierEffect
 from simgap.greybox.fitting import Problem
@@ -21,7 +21,7 @@ from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Term
 from simgap.greybox.selection import Selection
 from simgap.greybox.trial import Trial, significant
-from simgap.records import Channels
+from simgap.records import Channels, Kind
 
 # Two sets of effects whose scores (log-likelihood, less what the parameters cost) differ by less are not told apart.
 CONFOUNDED = 6.0
@@ -98,7 +98,7 @@ class Evidence:
             log_likelihood_ratio=ratio,
             parameters=values,
             per_experiment=effect.per_experiment,
-            confounded_with=tuple(separation(effect, rival.effect) for rival in rivals),
+            confounded_with=tuple(separation(effect, rival.effect, baseline.plant.kind) for rival in rivals),
             shows_in=effect.shows_in,
             profiles=self._profiles(term) if profiles else (),
         )  # fmt: skip
@@ -185,13 +185,49 @@ def gained(smaller: Trial, larger: Trial) -> float:
     return float(1 - larger.blocks.sum() / max(smaller.blocks.sum(), 1e-300))
 
 
-def separation(effect: Effect, other: Effect) -> Separation:
-    """Describe the experiment that would tell two effects apart, as either of them knows it."""
+# How an error behaves that each view shows.
+ERROR_THAT: dict[ViewName, str] = {
+    "offset": "is the same everywhere",
+    "time since the start": "changes with the time since the start of each experiment",
+    "drift within experiment": "drifts within each experiment",
+    "experiment": "differs from experiment to experiment",
+    "size by experiment": "is large in some experiments only",
+    "kind of experiment": "differs with the kind of experiment",
+    "size by kind of experiment": "is large in some kinds of experiment only",
+    "frequency band": "keeps to one band of frequencies",
+    "input": "depends on the size of the input",
+    "amplitude": "depends on the amplitude of the output",
+    "position": "depends on the position",
+    "level": "depends on the level",
+    "value": "depends on the value of the output",
+    "velocity": "depends on the velocity",
+    "rate of change": "depends on the rate of change of the output",
+    "sign of velocity": "depends on the direction of motion",
+    "time since reversal": "depends on the time since the last reversal",
+}
+
+
+def separation(effect: Effect, other: Effect, kind: Kind) -> Separation:
+    """Describe the experiment that would tell two effects apart on an output of this kind, as either of them knows it.
+
+    Where neither does: a richer input, if the two show in different views, and else a second sensor.
+    """
     experiment = effect.confounders.get(other.name) or other.confounders.get(effect.name)
     if not experiment:
-        views = " and ".join(dict.fromkeys(effect.shows_in[:1] + other.shows_in[:1]))
-        experiment = f"vary the amplitude and the speed of the input more, and look at the error against {views}"
+        view, of_other = most_telling(effect, kind), most_telling(other, kind)
+        experiment = (
+            f"vary the amplitude and the speed of the input more: an error that {ERROR_THAT[view]} then speaks for "
+            f"{effect.title}, one that {ERROR_THAT[of_other]} for {other.title}"
+        )
+        if view == of_other:
+            of_sensor = effect if effect.port == "output" else other
+            experiment = f"add a second sensor: only {of_sensor.title} makes the two readings differ"
     return Separation(other.name, other.title, experiment)
+
+
+def most_telling(effect: Effect, kind: Kind) -> ViewName:
+    """Return the first view that shows an effect among those of an output of this kind."""
+    return next(view for view in effect.shows_in if kind in VIEWS_OF_KINDS.get(view, (kind,)))
 
 
 def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

@@ -81,7 +81,7 @@ def view_figure(view: Wrong, unit: str) -> go.Figure | None:
     if len(at) < 2:
         return None
     size = view.view == LAST or view.view.startswith("size")
-    ticks: dict[str, Any] = {"title_text": label(view.view, view.unit)}
+    ticks: dict[str, Any] = {"title_text": label(view.label, view.unit)}
     if view.view == "sign of velocity":
         ticks |= {"tickvals": at, "ticktext": [DIRECTIONS.get(a, f"{a:g}") for a in view.at], "title_text": "direction"}
     if view.view in COUNTED:

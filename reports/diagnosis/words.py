@@ -10,14 +10,6 @@ from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
 LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
-# Words by which effects name views that have other names, or several. "input" and "position" take a channel's name.
-ALIASES = {
-    "time": ("time since the start",),
-    "frequency": (LAST,),
-    "first against second half": ("drift within experiment",),
-    "position": ("position", "value", "level"),
-    "velocity": ("velocity", "rate of change"),
-}
 
 
 def headline(findings: Findings) -> str:
@@ -86,12 +78,7 @@ def beyond_chance(findings: Findings) -> list[Wrong]:
 
 def shows(view: Wrong, cause: Cause) -> bool:
     """Tell whether a view is one of those that show the effect."""
-    for name in cause.shows_in:
-        for alias in ALIASES.get(name, (name,)):
-            channel = alias in ("input", "position") and view.view.startswith(f"{alias} ")
-            if view.view == alias or channel:
-                return True
-    return False
+    return view.view in cause.shows_in
 
 
 def orders(order: object) -> str:

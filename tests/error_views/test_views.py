@@ -38,7 +38,7 @@ def runs(error: Error, kind: str = "velocity", n: int = 8, samples: int = 200, s
 
 
 def found(*given) -> dict[str, Wrong]:
-    return {view.view: view for view in views(*runs(*given), N_INIT)}
+    return {view.label: view for view in views(*runs(*given), N_INIT)}
 
 
 def real(views_found: dict[str, Wrong]) -> list[str]:
@@ -83,7 +83,7 @@ def test_an_error_that_follows_reversals_is_seen_by_the_time_since_them():
 def test_an_error_at_high_input_is_seen_first_by_the_input():
     seen = found(lambda i, u, v, rng: 2 * np.maximum(0, u - 0.8) + noise(rng, v))
     first = next(iter(seen.values()))
-    assert first.view == "input u"
+    assert (first.view, first.channel) == ("input", "u")
     assert first.chance < 0.01
     assert first.unit == "V"
     assert "too low where the input u is above" in first.text
@@ -148,7 +148,7 @@ def test_a_velocity_is_also_held_against_the_position_beside_it():
         measured.append(Experiment(x.name, x.u, y, DT))
     seen = views(measured, both, channels, N_INIT)
     assert {view.output for view in seen} == {"omega"}  # phi is simulated exactly
-    assert seen[0].view == "position phi"
+    assert (seen[0].view, seen[0].channel) == ("position", "phi")
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])

@@ -1,31 +1,32 @@
 """Every effect of the catalogue: its texts, its bounds, and its term against rigs that were integrated elsewhere."""
 
+from functools import cache
+from itertools import permutations
+from typing import get_args
+
 import numpy as np
 import pytest
 
-from simgap.data.simulated.rigs import hide, physical, suitable
+from simgap.data.simulated.rigs import CATALOGUE, hide, physical, suitable
+from simgap.error_views.views import views
+from simgap.findings import VIEWS_OF_KINDS, ViewName
 from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.evidence import separation
+from simgap.records import Channel, Channels, Experiment, Kind
 from simgap.registry import EFFECTS, MODELS
-
-CATALOGUE = {
-    "dead_zone", "input_saturation", "asymmetric_gain", "backlash", "input_delay", "actuator_lag", "gain_fade",
-    "constant_load", "coulomb_friction", "stribeck_friction", "quadratic_drag", "quadratic_stiffness",
-    "cubic_stiffness", "position_torque", "periodic_disturbance", "hysteresis", "sqrt_outflow", "overflow",
-    "sensor_drift", "sensor_bias", "sensor_saturation", "sensor_lag", "absolute_sensor", "quantisation", "outliers",
-}  # fmt: skip
 
 
 def scales(kind="position", **changes):
-    sizes = dict(
+    signals = dict(
         kind=kind, order=2, dt=0.1, duration=30.0, u_low=-2.0, u_high=2.0, u_rms=1.0, y_low=-3.0, y_high=3.0,
         y_rms=1.0, x_max=3.0, v_max=4.0, stroke=3.0, force_rms=5.0, u_unit="V", y_unit="mm", lines=(0.5,),
         quantisation_step=0.1,
     )  # fmt: skip
-    return SignalScales(**(sizes | changes))
+    return SignalScales(**(signals | changes))
 
 
-def test_the_catalogue_is_complete():
-    assert set(EFFECTS.names()) == CATALOGUE
+def test_every_effect_can_be_hidden_in_a_rig_and_the_rigs_hide_nothing_else():
+    assert set(EFFECTS.names()) == set(CATALOGUE)
 
 
 @pytest.mark.parametrize("name", EFFECTS.names())
@@ -42,16 +43,67 @@ def test_effects_that_may_be_confused_come_with_the_experiment_that_separates_th
     for other, experiment in EFFECTS[name].confounders.items():
         assert other in CATALOGUE and other != name
         assert len(experiment) > 20
+        assert name not in EFFECTS[other].confounders, "both files know the pair"
+
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+def applies_to(name, kind):
+    """Whether an effect is ever tried on an output of this kind that has no negative readings."""
+    return EFFECTS[name]().applies_to(scales(kind, order=1 if kind == "velocity" else 2, y_low=-0.1))
+
+
+@cache
+def seen_on(kind):
+    """The names of all views of an output of this kind: six experiments of two kinds, and an error of noise."""
+    rng = np.random.default_rng(0)
+    experiments, simulated = [], []
+    for i in range(6):
+        u = rng.normal(size=(300, 1))
+        y_hat = np.cumsum(u, axis=0)
+        y = y_hat + rng.normal(size=u.shape)
+        experiments.append(Experiment(f"{i}_{('steps', 'sine')[i % 2]}", u, y, 0.1))
+        simulated.append(y_hat[5:])
+    return {
+        view.view for view in views(experiments, simulated, Channels((Channel("u"),), (Channel("y", "", kind),)), 5)
+    }
+
+
+@pytest.mark.parametrize("name", EFFECTS.names())
+def test_every_view_that_an_effect_names_is_one_that_an_error_has(name):
+    assert set(EFFECTS[name].shows_in) <= set().union(*map(seen_on, KINDS))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", EFFECTS.names())
+def test_an_effect_shows_in_some_view_of_every_output_that_it_is_tried_on(name, kind):
+    assert set(EFFECTS[name].shows_in) & seen_on(kind) or not applies_to(name, kind)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_output_has_the_views_of_its_kind(kind):
+    assert seen_on(kind) == {view for view in get_args(ViewName) if kind in VIEWS_OF_KINDS.get(view, (kind,))}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_two_effects_come_with_an_experiment_that_tells_them_apart(kind):
+    simulated = [name for name in EFFECTS.names() if EFFECTS[name].simulated and applies_to(name, kind)]
+    for effect, other in permutations((EFFECTS[name]() for name in simulated), 2):
+        apart = separation(effect, other, kind)
+        assert len(apart.experiment) > 20
+        if "second sensor:" in apart.experiment:  # which tells nothing about two effects on the same side of it
+            assert (effect.port == "output") != (other.port == "output"), (effect.name, other.name)
 
 
 @pytest.mark.parametrize("kind", ["position", "velocity", "level", "other"])
 @pytest.mark.parametrize("name", EFFECTS.names())
 def test_every_start_lies_within_the_bounds(name, kind):
-    effect, here = EFFECTS[name](), scales(kind, order=1 if kind == "velocity" else 2)
-    parameters = effect.parameters(here)
+    effect, sizes = EFFECTS[name](), scales(kind, order=1 if kind == "velocity" else 2)
+    parameters = effect.parameters(sizes)
     for parameter in parameters:
         assert parameter.low <= parameter.high
-    for start in effect.starts(here):
+    for start in effect.starts(sizes):
         assert len(start.values) == len(parameters)
         for value, parameter in zip(start.values, parameters, strict=True):
             assert parameter.low <= value <= parameter.high, parameter.name
@@ -68,9 +120,9 @@ def test_every_start_lies_within_the_bounds(name, kind):
     ],
 )
 def test_units_follow_from_what_the_output_measures(kind, unit, order, force, rate):
-    here = scales(kind, order=order, y_unit=unit)
-    assert here.force_unit == force
-    assert here.velocity_unit == rate
+    sizes = scales(kind, order=order, y_unit=unit)
+    assert sizes.force_unit == force
+    assert sizes.velocity_unit == rate
 
 
 # What a rig calls the size of an effect is the first number of the effect, but for these.
@@ -92,11 +144,11 @@ def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
     fitted = model.plants[0]
     y = fitted.records.y[fitted.records.mask]
     # A start on the wrong side of zero is not always corrected.
-    left = 0.03 if effect == "absolute_sensor" else 0.01
-    assert np.std(fitted.estimate.errors) < left * np.std(y)
+    unexplained = 0.03 if effect == "absolute_sensor" else 0.01
+    assert np.std(fitted.estimate.errors) < unexplained * np.std(y)
     if effect in NO_SIZE:
         return
     plant = fitted.estimate.plant
-    found = fitted.estimate.theta[plant.part_of(plant.terms[0])]
+    estimated = fitted.estimate.theta[plant.part_of(plant.terms[0])]
     size = SIZE.get(effect, lambda size, _: size)(physical(rig, {effect: 1.0})[effect], dataset)
-    assert abs(found[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)
+    assert abs(estimated[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)

@@ -78,7 +78,7 @@ def hostile(unexplained, named) -> Findings:
         confounded_with=(Separation(x, x, x),),
         profiles=tuple(replace(p, name=x, unit=x) for p in cause.profiles),
     )  # fmt: skip
-    bins = (Wrong(f"input {x}", x, 0.1, 0.0, x, (0.0, 1.0), (1.0, 2.0), x),)
+    bins = (Wrong("input", x, 0.1, 0.0, x, (0.0, 1.0), (1.0, 2.0), x, channel=x),)
     return replace(
         unexplained,
         dataset=x,

@@ -1,4 +1,4 @@
-"""A sensor without a sign."""
+"""A sensor that loses the sign of what it measures."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -16,30 +17,34 @@ class AbsoluteSensor(OutputEffect):
     """reading = abs(y)."""
 
     name: ClassVar[str] = "absolute_sensor"
-    title: ClassVar[str] = "sensor without a sign"
+    title: ClassVar[str] = "a sensor that loses the sign"
     explanation: ClassVar[str] = (
-        "The sensor shows the size but not the direction: a tachometer that counts pulses, a rectifier."
+        "The sensor shows how large the quantity is but not its sign, as a tachometer that counts pulses or a "
+        "rectifier does."
     )
     reference: ClassVar[str] = "Wigren and Schoukens, Coupled electric drives, Uppsala University TR 2017-024"
     visible_in_readings: ClassVar[bool] = True
     moves_poles: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 120
     hides_sign: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "position")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "position", "value", "level")
     confounders: ClassVar[dict[str, str]] = {
-        "sensor_saturation": "move slowly through zero: a saturated reading stays there, a rectified one bounces",
+        "sensor_saturation": "move slowly through zero: a saturated reading stays there, a rectified one turns back",
+        "quantisation": (
+            "move slowly: a coarse reading jumps from step to step everywhere, a rectified one turns back at zero"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """None."""
+        """Return no parameter: there is nothing to estimate."""
         return ()
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """The effect is there or it is not."""
+        """Start from the effect as it is: it has no size."""
         return [Start(())]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where no reading is below zero but for noise, though the input takes both signs."""
+        """Tell whether the input takes both signs while no reading is below zero, apart from noise."""
         return (
             scales.y_low > -0.4 * scales.y_high
             and scales.u_low < -0.2 * scales.u_max
@@ -48,5 +53,5 @@ class AbsoluteSensor(OutputEffect):
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The absolute value."""
+        """Return |y|."""
         return np.abs(y)

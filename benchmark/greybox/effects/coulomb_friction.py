@@ -1,9 +1,10 @@
-"""Dry friction."""
+"""Dry friction of constant size."""
 
 from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -24,30 +25,35 @@ class CoulombFriction(ForceEffect):
         "friction, Automatica 30, 1994"
     )
     role: ClassVar[Role] = "friction"
-    shows_in: ClassVar[tuple[str, ...]] = ("sign of velocity", "velocity", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
     confounders: ClassVar[dict[str, str]] = {
-        "stribeck_friction": "creep through zero very slowly: with Stribeck friction the force falls as it starts "
-        "to move",
-        "dead_zone": "drive it at constant speed and change the input a little: friction keeps its force, a dead "
-        "zone takes its share of the input only near zero",
-        "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
-        "quadratic_drag": "run at two constant speeds, one twice the other: dry friction costs the same at both",
-        "backlash": "stop and start again in the same direction: friction sticks, play is already taken up",
+        "stribeck_friction": (
+            "creep through zero very slowly: Stribeck friction falls as the motion starts, Coulomb friction does not"
+        ),
+        "dead_zone": (
+            "let it run, then set the input to zero: friction brakes it to a stop, behind a dead zone it coasts as the "
+            "linear model does"
+        ),
+        "hysteresis": "make very small strokes: a hysteretic force pulls back like a spring, dry friction just sticks",
+        "quadratic_drag": (
+            "run at two constant speeds, one twice the other: drag becomes four times as large, dry friction stays the "
+            "same"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The friction force."""
+        """Return the friction force."""
         return (Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """From little to what nearly holds the drive."""
+        """Start from little friction to what nearly holds the drive."""
         return [Start((share * scales.force_rms,)) for share in (0.05, 0.2, 0.5)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where something moves."""
+        """Tell whether the output is that of a motion."""
         return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """The force that dry friction can hold."""
+        """Return the force that dry friction can hold."""
         return p[i]

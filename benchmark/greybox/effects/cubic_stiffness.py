@@ -1,9 +1,10 @@
-"""A cubic spring."""
+"""A spring with a cubic characteristic."""
 
 from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -16,21 +17,29 @@ class CubicStiffness(ForceEffect):
     name: ClassVar[str] = "cubic_stiffness"
     title: ClassVar[str] = "cubic stiffness"
     explanation: ClassVar[str] = (
-        "A spring that gets stiffer (or softer) the further it is stretched, both ways: a clamped beam, rubber "
-        "near its limit, a membrane."
+        "A spring that gets stiffer (or softer) the further it is stretched, in both directions: a clamped beam, "
+        "rubber near its limit, a membrane."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "position_torque": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
-        "input_saturation": "hold constant inputs up to the largest: saturation ends the growth at one value of "
-        "the input",
+        "position_torque": (
+            "travel further: a force that repeats over position turns back, a cubic spring pulls harder and harder"
+        ),
+        "input_saturation": (
+            "hold constant inputs up to the largest: with saturation the output stops growing at one input, with a "
+            "stiffening spring it grows more and more slowly"
+        ),
         "quadratic_drag": "hold it at rest away from the middle: a spring still pulls, drag does not",
+        "quadratic_stiffness": (
+            "hold it equally far from the middle on both sides: a cubic spring pulls back from both, a quadratic one "
+            "pulls in the same direction on both"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The coefficient."""
+        """Return the coefficient k."""
         return (
             Parameter(
                 "stiffness",
@@ -41,14 +50,14 @@ class CubicStiffness(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """A weak spring."""
+        """Start from a weak spring."""
         return [Start((0.1 * scales.force_rms / scales.x_max**3,), amplitude=0)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where a position is known."""
+        """Tell whether the simulation has a position."""
         return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """The spring's pull."""
+        """Return the pull of the spring, -k x^3."""
         return -p[i] * x * x * x

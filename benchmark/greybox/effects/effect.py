@@ -9,17 +9,18 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.records import Kind
 
 Port = Literal["input", "force", "output"]
-# What a force term's number means to the integration: a force; the largest force that dry friction can hold; or
-# what flows out of a tank on top of its linear outflow.
+# What the simulation does with the value of a force term: adds it to the forces; lets dry friction hold up to it; lets
+# so much flow out of a tank on top of its linear outflow; or lets the tank overflow above it.
 Role = Literal["force", "friction", "outflow", "rim"]
 
 
 @dataclass(frozen=True)
 class SignalScales:
-    """Sizes of a plant's signals in physical units, known before an effect is fitted."""
+    """Sizes of the signals of a plant in physical units, known before an effect is fitted."""
 
     kind: Kind
     order: int
@@ -42,28 +43,28 @@ class SignalScales:
 
     @property
     def u_max(self) -> float:
-        """Largest input, either way."""
+        """Largest absolute value of the input."""
         return max(abs(self.u_low), abs(self.u_high))
 
-    def unit(self, place: int, s: int) -> str:
-        """The unit [place]^place s^s, [place] being what the output measures or, for a velocity, its integral."""
-        base, rate = (self.y_unit.removesuffix("/s"), place) if self.y_unit.endswith("/s") else (self.y_unit, 0)
+    def unit(self, length: int, s: int) -> str:
+        """Write the unit L^length s^s, where L is the output's unit or, for a velocity, that of its integral."""
+        base, rate = (self.y_unit.removesuffix("/s"), length) if self.y_unit.endswith("/s") else (self.y_unit, 0)
         if self.kind == "velocity" and not rate:
-            s += place  # the output's unit is that of a velocity whatever it is called
+            s += length  # the output's unit is that of a velocity whatever it is called
         if self.kind != "velocity":
             s -= rate
         base = f"({base})" if "/" in base else base
-        powers = [(base, place), ("s", s)] if base else [("s", s)]
-        above = [f"{name}^{n}" if n > 1 else name for name, n in powers if n > 0]
-        below = [f"{name}^{-n}" if n < -1 else name for name, n in powers if n < 0]
-        if not below:
-            return " ".join(above)
-        under = below[0] if len(below) == 1 else f"({' '.join(below)})"
-        return f"{' '.join(above) or '1'}/{under}"
+        powers = [(base, length), ("s", s)] if base else [("s", s)]
+        numerator = " ".join(f"{name}^{n}" if n > 1 else name for name, n in powers if n > 0)
+        factors = [f"{name}^{-n}" if n < -1 else name for name, n in powers if n < 0]
+        if not factors:
+            return numerator
+        denominator = factors[0] if len(factors) == 1 else f"({' '.join(factors)})"
+        return f"{numerator or '1'}/{denominator}"
 
     @property
     def force_unit(self) -> str:
-        """Unit of what acts on the plant: of the highest derivative."""
+        """Unit of the forces on the plant: that of the highest derivative."""
         return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
 
     @property
@@ -74,7 +75,7 @@ class SignalScales:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect: its unit and its bounds. A fixed one is read off the data and not estimated."""
+    """One number of an effect, with its unit and its bounds. A fixed one is read off the data and not estimated."""
 
     name: str
     unit: str
@@ -84,7 +85,7 @@ class Parameter:
 
 
 class Start(NamedTuple):
-    """Where a fit may begin; `amplitude` is the parameter that the effect is proportional to, if there is one."""
+    """Values that a fit begins with; `amplitude` indexes the parameter that the effect is proportional to, if any."""
 
     values: tuple[float, ...]
     amplitude: int | None = None
@@ -98,9 +99,9 @@ class Effect(ABC):
     explanation: ClassVar[str]
     reference: ClassVar[str]
     port: ClassVar[Port]
-    # The views of the error that show it, most telling first: their names in `simgap.error_views`.
-    shows_in: ClassVar[tuple[str, ...]] = ()
-    # Effects that the data may not separate from this one, and the experiment that would.
+    # The views of the error that show it, the most telling first.
+    shows_in: ClassVar[tuple[ViewName, ...]] = ()
+    # Effects that data may not tell from this one, and the experiment that would; each pair stands in one file only.
     confounders: ClassVar[dict[str, str]] = {}
     # Simpler effects that this one contains as a special case; it takes their place in a model.
     contains: ClassVar[tuple[str, ...]] = ()
@@ -116,7 +117,7 @@ class Effect(ABC):
     time_power: ClassVar[int | None] = None
     # False when it cannot be simulated and is found in the errors instead.
     simulated: ClassVar[bool] = True
-    # A linear model of higher order would take it up, so it is tried before the nonlinear effects.
+    # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.
     linear: ClassVar[bool] = False
     # May explain what otherwise asks for a higher order of the plant.
     instead_of_order: ClassVar[bool] = False
@@ -140,41 +141,42 @@ class Effect(ABC):
         return True
 
     def describe(self, values: dict[str, float]) -> str:
-        """Say for an engineer what was found, with the estimated values."""
+        """Say what was found in the words of an engineer, with the estimated values."""
         return self.explanation
 
 
 class InputEffect(Effect):
-    """Between the input asked for and the input that arrives."""
+    """An effect between the commanded input and the input that acts on the plant."""
 
     port: ClassVar[Port] = "input"
 
     @staticmethod
     @abstractmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """What arrives of u [E, K], piecewise constant over steps of h seconds; the record starts at rest."""
+        """Return what arrives of u [E, K], both constant over steps of h seconds; the record starts at rest."""
 
 
 class ForceEffect(Effect):
-    """Acts on the plant together with the input."""
+    """An effect that acts on the plant together with the input."""
 
     port: ClassVar[Port] = "force"
     role: ClassVar[Role] = "force"
     substeps: ClassVar[int] = 4
-    # Compiled by the simulator, called once a substep: x position, v velocity, t seconds since the start, h the
-    # substep; parameters p[i], p[i + 1], ... and memory m[j], ...
+    # Compiled by the simulator and called once per substep as term(x, v, t, h, p, i, m, j): position x, velocity v,
+    # time t and substep h in s; its parameters are p[i], p[i + 1], ..., its states m[j], ...
     term: ClassVar[Callable[..., float]]
 
 
 class OutputEffect(Effect):
-    """Between the quantity itself and its reading."""
+    """An effect between the measured quantity and its reading."""
 
     port: ClassVar[Port] = "output"
 
     @staticmethod
     @abstractmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The reading of y [E, T] at the times t [T] in s."""
+        """Return the reading of y [E, T] at the times t [T] in s."""
 
 
+# Kinds of outputs that tell a motion.
 MOTION = ("position", "velocity", "other")

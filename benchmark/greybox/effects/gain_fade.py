@@ -1,4 +1,4 @@
-"""A gain that fades in the course of an experiment."""
+"""A gain that falls in the course of an experiment."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -16,28 +17,27 @@ class GainFade(InputEffect):
     """u' = (1 - r t) u, t since the start of the experiment."""
 
     name: ClassVar[str] = "gain_fade"
-    title: ClassVar[str] = "gain that fades with time"
+    title: ClassVar[str] = "a gain that fades with time"
     explanation: ClassVar[str] = (
-        "The same input does less and less in the course of each experiment: a sagging battery, a winding that "
-        "warms up, "
-        "oil that changes with temperature."
+        "The same input achieves less and less in the course of each experiment: a battery that runs down, a winding "
+        "that warms up, oil that changes with temperature."
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
     place_in_chain: ClassVar[int] = 20
-    shows_in: ClassVar[tuple[str, ...]] = ("first against second half", "time")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
-        "sensor_drift": "record at rest without input: a drift is still there, a fading gain is not",
+        "sensor_drift": "record at rest without input: a drift is still there, a fading gain has nothing to act on",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Share of the gain that is lost per second; negative where it grows."""
+        """Return the share of the gain that is lost per second; it is negative where the gain grows."""
         return (Parameter("loss rate", "1/s", -2.0 / scales.duration, 1.0 / scales.duration),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Either way."""
+        """Start from a slow loss; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 / scales.duration,), amplitude=0)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """Times 1 - p[0] t at the middle of each step."""
+        """Return u (1 - p[0] t), with t at the middle of each step."""
         return u * (1 - p[0] * h * (np.arange(u.shape[1]) + 0.5))

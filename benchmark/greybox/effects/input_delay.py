@@ -1,4 +1,4 @@
-"""Dead time of the input."""
+"""A dead time of the input."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -16,35 +17,35 @@ class InputDelay(InputEffect):
     """u'(t) = u(t - tau)."""
 
     name: ClassVar[str] = "input_delay"
-    title: ClassVar[str] = "delay of the input"
+    title: ClassVar[str] = "input delay"
     explanation: ClassVar[str] = (
-        "The input arrives unchanged but late: transport in a pipe or on a belt, a bus, a computation that takes a "
+        "The input arrives unchanged but late: transport in a pipe or on a belt, a bus, a computation that takes one "
         "cycle."
     )
     reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
     place_in_chain: ClassVar[int] = 10
     linear: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
-        "actuator_lag": "apply a step and sample fast: after a delay nothing moves at first, a lag starts at once; "
-        "a short "
-        "hold of the input excites the high frequencies that tell them apart",
-        "sensor_lag": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
+        "sensor_lag": (
+            "apply a step and sample fast: with a delay nothing happens at first, with a lag the reading starts to "
+            "change at once"
+        ),
     }
     substeps: ClassVar[int] = 4
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The delay."""
+        """Return the delay."""
         return (Parameter("delay", "s", 0.0, min(60 * scales.dt, 0.25 * scales.duration)),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """From half a sample to many."""
+        """Start from half a sample to many."""
         return [Start((n * scales.dt,)) for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """The mean over each step of what left p[0] seconds before; before the record u stood at its first value."""
+        """Return the mean over each step of u, p[0] seconds before; before the record u stood at its first value."""
         whole, part = divmod(max(p[0], 0.0) / h, 1.0)
         steps = min(int(whole), u.shape[1] - 1)
         padded = np.concatenate((np.repeat(u[:, :1], steps + 1, axis=1), u), axis=1)

@@ -1,4 +1,4 @@
-"""Saturation of the actuator."""
+"""A limit of the actuator."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -18,29 +19,34 @@ class InputSaturation(InputEffect):
     name: ClassVar[str] = "input_saturation"
     title: ClassVar[str] = "saturation of the actuator"
     explanation: ClassVar[str] = (
-        "Beyond a limit more input brings nothing: the supply voltage, a current limit or the end of a valve's travel."
+        "Beyond a limit more input has no effect: the supply voltage, a current limit, the end of a valve's travel."
     )
     reference: ClassVar[str] = "Hippe, Windup in Control, 2006, ch. 1"
     place_in_chain: ClassVar[int] = 50
-    shows_in: ClassVar[tuple[str, ...]] = ("input", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "quadratic_drag": "hold constant inputs up to the largest: with saturation the steady output stops growing "
-        "at once, "
-        "with drag it bends",
-        "sensor_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "cubic_stiffness": "hold constant inputs up to the largest: saturation ends the growth at one value of the "
-        "input",
+        "quadratic_drag": (
+            "hold constant inputs up to the largest: with saturation the steady speed stops growing at one input, with "
+            "drag it grows more and more slowly"
+        ),
+        "sensor_saturation": (
+            "change the load at the largest input: a saturated reading does not move, the reading behind a saturated "
+            "actuator does"
+        ),
+        "overflow": (
+            "fill it slowly with a small input: an overflow still stops the level, a saturated actuator does not"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The limit, the same both ways."""
+        """Return the limit, the same in both directions."""
         return (Parameter("limit", scales.u_unit, 0.02 * scales.u_max, scales.u_max),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Limits that are met seldom, and often."""
+        """Start from limits that are met seldom to one that is met often."""
         return [Start((share * scales.u_max,)) for share in (0.9, 0.75, 0.55, 0.35)]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """Clip at p[0] both ways."""
+        """Return u clipped to -p[0] .. p[0]."""
         return np.clip(u, -p[0], p[0])

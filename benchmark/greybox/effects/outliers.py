@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -18,27 +19,26 @@ class Outliers(OutputEffect):
     name: ClassVar[str] = "outliers"
     title: ClassVar[str] = "outliers"
     explanation: ClassVar[str] = (
-        "Single readings are far off and the next one is right again: a loose plug, a lost package, a reflection."
+        "Single readings are far off and the next one is right again: a loose plug, a lost packet, a reflection."
     )
     reference: ClassVar[str] = "Huber and Ronchetti, Robust Statistics, 2009, ch. 1"
     place_in_chain: ClassVar[int] = 150
     simulated: ClassVar[bool] = False
-    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
-    confounders: ClassVar[dict[str, str]] = {}
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("size by experiment",)
     per_experiment: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """How many readings, and how far they are off; estimated from the errors, not by the simulation."""
+        """Return the share of readings that are off, and how far; both are estimated from the errors."""
         return (
             Parameter("share of readings", "", 0.0, 0.2, fixed=True),
             Parameter("size", scales.y_unit, 0.0, 100 * scales.y_rms, fixed=True),
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """None: what is an outlier shows in the errors of the rest."""
+        """Return no start: outliers are found in the errors of a simulation without them."""
         return []
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Nothing: which reading is off cannot be simulated."""
+        """Return y: which reading is off cannot be simulated."""
         return y

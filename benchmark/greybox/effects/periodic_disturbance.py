@@ -1,10 +1,11 @@
-"""A sine force over time."""
+"""A force that is a sine of time."""
 
 from __future__ import annotations
 
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -15,23 +16,28 @@ class PeriodicDisturbance(ForceEffect):
     """f = A sin(2 pi f t + phase), t since the start of the experiment."""
 
     name: ClassVar[str] = "periodic_disturbance"
-    title: ClassVar[str] = "periodic disturbance"
+    title: ClassVar[str] = "a periodic disturbance"
     explanation: ClassVar[str] = (
-        "A force of one frequency that has nothing to do with the input: an unbalanced rotor nearby, mains hum, a "
-        "pump's pulsation."
+        "A force of one frequency that has nothing to do with the input: an unbalanced rotor nearby, mains hum, the "
+        "pulsation of a pump."
     )
     reference: ClassVar[str] = (
         "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"
     )
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("frequency band", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
-        "position_torque": "move at another speed: a disturbance in time keeps its frequency",
-        "sensor_drift": "record for longer: a drift does not come back",
+        "position_torque": (
+            "move at another speed: a disturbance in time keeps its frequency, a force over position does not"
+        ),
+        "sensor_drift": "record for longer: a disturbance repeats itself, a drift goes on growing",
+        "actuator_lag": "record without any input: a disturbance goes on, a lag has nothing to act on",
+        "sensor_lag": "record without any input: a disturbance goes on, a lag has nothing to act on",
+        "input_delay": "record without any input: a disturbance goes on, a delay has nothing to act on",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Amplitude, frequency, and phase at the start of an experiment."""
+        """Return the amplitude, the frequency, and the phase at the start of an experiment."""
         return (
             Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
             Parameter("frequency", "Hz", 0.2 / scales.duration, 0.5 / scales.dt),
@@ -39,7 +45,7 @@ class PeriodicDisturbance(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Lines of the error's spectrum that all experiments share, each with two phases."""
+        """Start from the lines that the error spectra of all experiments share, each with two phases."""
         return [
             Start((0.1 * scales.force_rms, frequency, phase), amplitude=0)
             for frequency in scales.lines
@@ -48,5 +54,5 @@ class PeriodicDisturbance(ForceEffect):
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """A sine over time."""
+        """Return A sin(2 pi f t + phase)."""
         return p[i] * math.sin(6.283185307179586 * p[i + 1] * t + p[i + 2])

@@ -1,10 +1,11 @@
-"""A force that repeats over position."""
+"""A force that is a sine of position."""
 
 from __future__ import annotations
 
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -15,26 +16,25 @@ class PositionTorque(ForceEffect):
     """f = A sin(2 pi x / X + phase)."""
 
     name: ClassVar[str] = "position_torque"
-    title: ClassVar[str] = "torque that depends on position"
+    title: ClassVar[str] = "a force that repeats over position"
     explanation: ClassVar[str] = (
-        "A force that goes up and down over the travel, whatever the time: cogging of a motor's magnets, a cable "
-        "or hose that pulls, an eccentric mass."
+        "A force that rises and falls along the travel, at whatever time and speed: cogging of a motor's magnets, an "
+        "eccentric mass, a cable or hose that pulls."
     )
     reference: ClassVar[str] = (
         "Proca et al., Analytical model for permanent magnet motors with surface mounted magnets, IEEE Trans. "
         "Energy Conversion 18, 2003"
     )
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value")
     confounders: ClassVar[dict[str, str]] = {
-        "cubic_stiffness": "travel further: a torque that repeats over position turns back, a hardening spring goes on",
-        "periodic_disturbance": "move at another speed: a torque over position changes its frequency in time",
-        "constant_load": "hold it at several positions: a load is the same at all of them",
-        "quadratic_stiffness": "travel further: a torque that repeats over position turns back",
+        "quadratic_stiffness": (
+            "travel further: a force that repeats over position turns back, a spring pulls harder and harder"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Amplitude, length of one period, and phase at position zero."""
+        """Return the amplitude, the length of one period, and the phase at position zero."""
         return (
             Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
             Parameter("period", scales.y_unit, 0.05 * scales.x_max, 2 * scales.x_max),
@@ -42,7 +42,7 @@ class PositionTorque(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Periods from a tenth of the travel to several times its length, each with two phases."""
+        """Start from periods of 0.2 to 1.5 times the largest distance from zero, each with two phases."""
         return [
             Start((0.1 * scales.force_rms, length * scales.x_max, phase), amplitude=0)
             for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.5)
@@ -50,10 +50,10 @@ class PositionTorque(ForceEffect):
         ]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where a position is known."""
+        """Tell whether the simulation has a position."""
         return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """A sine over position."""
+        """Return A sin(2 pi x / X + phase)."""
         return p[i] * math.sin(6.283185307179586 * x / p[i + 1] + p[i + 2])

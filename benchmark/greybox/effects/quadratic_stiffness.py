@@ -1,9 +1,10 @@
-"""A quadratic spring."""
+"""A spring with a quadratic characteristic."""
 
 from __future__ import annotations
 
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -16,19 +17,15 @@ class QuadraticStiffness(ForceEffect):
     name: ClassVar[str] = "quadratic_stiffness"
     title: ClassVar[str] = "quadratic stiffness"
     explanation: ClassVar[str] = (
-        "A spring that pulls harder on one side than on the other: a preloaded or one-sided suspension, a magnet's "
-        "pull."
+        "A spring that gets stiffer in one direction and softer in the other: a preloaded or one-sided suspension, the "
+        "pull of a magnet."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
-    confounders: ClassVar[dict[str, str]] = {
-        "constant_load": "hold it at several positions: a load is the same at all of them",
-        "asymmetric_gain": "hold constant inputs of several sizes both ways: an unequal gain gives two straight lines",
-    }
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The coefficient."""
+        """Return the coefficient k."""
         return (
             Parameter(
                 "stiffness",
@@ -39,14 +36,14 @@ class QuadraticStiffness(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """A weak spring."""
+        """Start from a weak spring."""
         return [Start((0.1 * scales.force_rms / scales.x_max**2,), amplitude=0)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where a position is known."""
+        """Tell whether the simulation has a position."""
         return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """The spring's pull."""
+        """Return the pull of the spring, -k x^2."""
         return -p[i] * x * x

@@ -1,4 +1,4 @@
-"""A coarse reading."""
+"""A reading that comes in steps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -20,22 +21,21 @@ class Quantisation(OutputEffect):
     explanation: ClassVar[str] = "The reading comes in steps: few counts of an encoder, few bits of a converter."
     reference: ClassVar[str] = "Widrow and Kollar, Quantization Noise, 2008, ch. 4"
     place_in_chain: ClassVar[int] = 140
-    shows_in: ClassVar[tuple[str, ...]] = ("position",)
-    confounders: ClassVar[dict[str, str]] = {}
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The step, as read off the values themselves."""
+        """Return the step, which is read off the data and not estimated."""
         return (Parameter("step", scales.y_unit, scales.quantisation_step, scales.quantisation_step, fixed=True),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """The grid of the readings."""
+        """Start from the grid of the readings."""
         return [Start((scales.quantisation_step,))]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where the readings lie on a grid."""
+        """Tell whether the readings lie on a grid."""
         return scales.quantisation_step > 0
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """To the nearest multiple of p[0]."""
+        """Round y to the nearest multiple of p[0]."""
         return p[0] * np.round(y / p[0])

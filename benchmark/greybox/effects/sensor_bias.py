@@ -1,4 +1,4 @@
-"""A biased sensor."""
+"""A sensor with an offset."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -18,27 +19,26 @@ class SensorBias(OutputEffect):
     name: ClassVar[str] = "sensor_bias"
     title: ClassVar[str] = "sensor bias"
     explanation: ClassVar[str] = (
-        "The reading is off by a constant that differs from experiment to experiment: a zero that is not set, an "
-        "encoder switched on anywhere."
+        "The reading is off by a constant that differs from experiment to experiment: a zero that was not set, an "
+        "encoder that counts from wherever it was switched on."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     time_power: ClassVar[int | None] = 0
-    shows_in: ClassVar[tuple[str, ...]] = ("experiment",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
-        "constant_load": "turn the machine by hand or support the load: the reading of a biased sensor stays off",
-        "sensor_drift": "record for longer: a drift goes on growing",
+        "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
     }
     per_experiment: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The bias."""
+        """Return the bias."""
         return (Parameter("bias", scales.y_unit, -10 * scales.y_rms, 10 * scales.y_rms),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Either way."""
+        """Start from a small bias; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms,), amplitude=0)]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Plus p[0]."""
+        """Return y + p[0]."""
         return y + p[0]

@@ -1,4 +1,4 @@
-"""A drifting sensor."""
+"""A sensor whose offset grows steadily."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -23,16 +24,11 @@ class SensorDrift(OutputEffect):
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     time_power: ClassVar[int | None] = 1
-    shows_in: ClassVar[tuple[str, ...]] = ("time", "first against second half")
-    confounders: ClassVar[dict[str, str]] = {
-        "gain_fade": "record at rest without input: a drift is still there",
-        "constant_load": "record for longer: a drift goes on growing",
-        "sensor_bias": "record for longer: a bias stays as it is",
-    }
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since the start", "drift within experiment")
     per_experiment: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The slope."""
+        """Return the slope of the drift."""
         return (
             Parameter(
                 "slope",
@@ -43,10 +39,10 @@ class SensorDrift(OutputEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Either way."""
+        """Start from a slow drift; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms / scales.duration,), amplitude=0)]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Plus p[0] t."""
+        """Return y + p[0] t."""
         return y + p[0] * t

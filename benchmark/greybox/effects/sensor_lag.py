@@ -1,4 +1,4 @@
-"""A slow sensor."""
+"""A first-order lag of the sensor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 from scipy.signal import lfilter
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -17,31 +18,26 @@ class SensorLag(OutputEffect):
     """T dr/dt = y - r, r the reading."""
 
     name: ClassVar[str] = "sensor_lag"
-    title: ClassVar[str] = "lag of the sensor"
+    title: ClassVar[str] = "sensor lag"
     explanation: ClassVar[str] = (
         "The reading follows the quantity like a first-order filter: a thermometer in its sheath, a filtered signal."
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
     place_in_chain: ClassVar[int] = 110
     linear: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("frequency", "time since reversal")
-    confounders: ClassVar[dict[str, str]] = {
-        "actuator_lag": "only a second sensor, or measuring what arrives from the actuator, tells the two apart in "
-        "a machine that is otherwise linear: they are the same transfer function",
-        "input_delay": "apply a step and sample fast: after a delay the reading is flat at first, a lag bends at once",
-    }
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The time constant."""
+        """Return the time constant."""
         return (Parameter("time constant", "s", 0.0, 0.25 * scales.duration),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """From a sample to a good part of the record."""
+        """Start from one sample to a good part of the record."""
         return [Start((n * scales.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """A first-order lag of p[0] seconds, exact for straight lines between samples; it starts settled."""
+        """Delay y by a first-order lag of p[0] seconds, exact for straight lines between samples; it starts settled."""
         if len(t) < 2 or p[0] <= 1e-3 * (t[1] - t[0]):
             return y
         ratio = (t[1] - t[0]) / p[0]

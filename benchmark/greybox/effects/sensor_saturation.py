@@ -1,4 +1,4 @@
-"""A saturated sensor."""
+"""A sensor with a limited range."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -17,19 +18,20 @@ class SensorSaturation(OutputEffect):
 
     name: ClassVar[str] = "sensor_saturation"
     title: ClassVar[str] = "saturation of the sensor"
-    explanation: ClassVar[str] = "Beyond its range the sensor shows its last value while the machine goes on moving."
+    explanation: ClassVar[str] = "Beyond its range the sensor shows the end of its range, while the machine moves on."
     reference: ClassVar[str] = "Tao and Kokotovic, 1996, ch. 2"
     place_in_chain: ClassVar[int] = 130
-    shows_in: ClassVar[tuple[str, ...]] = ("position", "amplitude")
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
-        "input_saturation": "change the load at the largest input: the reading of a saturated sensor does not move",
-        "overflow": "watch how it comes back from the limit: an overflow leaves it at once, a saturated sensor "
-        "only when the level is back in range",
-        "absolute_sensor": "move slowly through zero",
+        "sqrt_outflow": "empty it through a measured drain: a saturated reading stands still while the level falls",
+        "quantisation": (
+            "move slowly: a coarse reading jumps from step to step everywhere, a saturated one stands still beyond its "
+            "limit"
+        ),
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The ends of the range."""
+        """Return the lowest and the highest reading."""
         return (
             Parameter(
                 "lowest reading",
@@ -46,7 +48,7 @@ class SensorSaturation(OutputEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Just inside what was read, at either end or both."""
+        """Start just inside the extreme readings, at either end or both."""
         span = scales.y_high - scales.y_low
         inside_low, inside_high = scales.y_low + 0.03 * span, scales.y_high - 0.03 * span
         beyond_low, beyond_high = scales.y_low - 0.4 * span, scales.y_high + 0.4 * span
@@ -56,5 +58,5 @@ class SensorSaturation(OutputEffect):
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Clip to p[0] .. p[1]."""
+        """Return y clipped to p[0] .. p[1]."""
         return np.clip(y, p[0], max(p[0], p[1]))

@@ -1,10 +1,11 @@
-"""Outflow by gravity."""
+"""A tank that empties by gravity."""
 
 from __future__ import annotations
 
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -17,20 +18,16 @@ class SqrtOutflow(ForceEffect):
     name: ClassVar[str] = "sqrt_outflow"
     title: ClassVar[str] = "square-root outflow"
     explanation: ClassVar[str] = (
-        "A tank empties through a hole with the square root of its level, not in proportion to it."
+        "A tank empties through a hole in proportion to the square root of its level, not to the level itself."
     )
     reference: ClassVar[str] = "Torricelli 1643; Wigren and Schoukens, Three free data sets, ECC 2013 (cascaded tanks)"
     role: ClassVar[Role] = "outflow"
     moves_poles: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[str, ...]] = ("level", "amplitude")
-    confounders: ClassVar[dict[str, str]] = {
-        "overflow": "fill it slowly past the largest level: only an overflow stops the rise",
-        "sensor_saturation": "empty it through a measured drain: a saturated reading stays while the level falls",
-    }
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("level", "amplitude")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Share of the square root, and the level where both laws agree."""
+        """Return the share of the square root, and the level at which both laws agree."""
         middle = max(0.5 * (scales.y_low + scales.y_high), 0.05 * scales.y_high)
         return (
             Parameter("square-root share", "", 0.0, 1.0),
@@ -38,16 +35,16 @@ class SqrtOutflow(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Weak and strong."""
+        """Start from a weak and from a strong square root."""
         return [
             Start((share, max(0.5 * (scales.y_low + scales.y_high), 0.05 * scales.y_high))) for share in (0.4, 0.95)
         ]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where a level is measured."""
+        """Tell whether the output is a level."""
         return scales.kind == "level" and scales.y_high > 0
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """What flows out at level x on top of x, in units of the linear rate."""
+        """Return what flows out at level x on top of x, in units of the linear rate."""
         return p[i] * (math.sqrt(x * p[i + 1]) - x) if x > 0.0 else 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+from simgap.findings import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -17,23 +18,16 @@ class StribeckFriction(ForceEffect):
     name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"
     explanation: ClassVar[str] = (
-        "Dry friction that is larger at standstill and falls within a small velocity, because a film of lubricant "
-        "builds up: it breaks away with a jerk and creeps badly."
+        "Dry friction that is largest at standstill and falls within a small velocity, as a film of lubricant builds "
+        "up: the machine breaks away with a jerk and creeps unevenly."
     )
     reference: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, sec. 2"
     role: ClassVar[Role] = "friction"
     contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
-    shows_in: ClassVar[tuple[str, ...]] = ("velocity", "sign of velocity")
-    confounders: ClassVar[dict[str, str]] = {
-        "coulomb_friction": "creep through zero very slowly: with Coulomb friction alone the force does not fall "
-        "as it starts to move",
-        "dead_zone": "drive it at constant speed and change the input a little: a dead zone acts around zero input "
-        "only",
-        "hysteresis": "make very small strokes: a hysteretic force is elastic there, dry friction sticks",
-    }
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("velocity", "rate of change", "sign of velocity")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """The friction force in motion, what comes on top at standstill, and the velocity that it falls within."""
+        """Return the friction force in motion, its rise at standstill, and the velocity within which it falls."""
         return (
             Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),
             Parameter("rise at standstill", scales.force_unit, 0.0, 10 * scales.force_rms),
@@ -41,7 +35,7 @@ class StribeckFriction(ForceEffect):
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Several levels and velocities."""
+        """Start from several forces and Stribeck velocities."""
         return [
             Start((level * scales.force_rms, level * scales.force_rms, share * scales.v_max))
             for level in (0.1, 0.3)
@@ -49,11 +43,11 @@ class StribeckFriction(ForceEffect):
         ]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Where something moves."""
+        """Tell whether the output is that of a motion."""
         return scales.kind in MOTION
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """The force that dry friction can hold."""
+        """Return the force that dry friction can hold."""
         ratio = v / p[i + 2]
         return p[i] + p[i + 1] * math.exp(-ratio * ratio)
