@@ -108,7 +108,7 @@ def recovery(
     known = {row.case: row for row in read(file) if row.status == "ok" and row.code_sha256 == digest}
     todo = [CaseJob(case, digest) for case in cases if case not in known]
     if len(todo) < len(cases):
-        execution.note(f"{len(cases) - len(todo)} of {len(cases)} cases are done already and were not run again")
+        execution.send(f"{len(cases) - len(todo)} of {len(cases)} cases are done already and were not run again")
 
     def keep(rows: Sequence[CaseResult]) -> None:
         text = "".join(json.dumps(store.plain(asdict(row)), allow_nan=False) + "\n" for row in rows)

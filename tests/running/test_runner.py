@@ -101,7 +101,7 @@ def test_a_second_run_computes_only_what_is_missing(suite, tmp_path):
     first = simgap.run(suite("Mean"), out=tmp_path / "out")
     second = simgap.run(suite("Mean", "Scaled"), seeds=2, out=tmp_path / "out", progress=events.append)
     assert [row for row in second if row.model == "Mean" and row.seed == 0] == first
-    assert "1 of 4 jobs are done already and were not run again" in [event.note for event in events]
+    assert "1 of 4 jobs are done already and were not run again" in [event.message for event in events]
     assert max(event.total for event in events) == 3
 
 
@@ -232,7 +232,7 @@ def test_missing_data_of_a_suite_are_noted_and_missing_data_of_the_user_refused(
     path = suite("Mean", datasets='["cascaded_tanks", "noise"]')
     rows = simgap.run(path, out=tmp_path / "out", progress=events.append)
     assert {row.dataset for row in rows} == {"noise"}
-    assert any(event.note.startswith("left out: cascaded_tanks is not at hand") for event in events)
+    assert any(event.message.startswith("left out: cascaded_tanks is not at hand") for event in events)
     with pytest.raises(UnusableInput, match="cascaded_tanks is not at hand"):
         simgap.run(path, datasets=["cascaded_tanks"], out=tmp_path / "out")
     with pytest.raises(UnusableInput, match="none of the data sets"):
@@ -271,7 +271,7 @@ def test_an_interrupted_run_keeps_what_is_done_and_carries_on(suite, tmp_path):
     assert complaint == "interrupted; what is done is stored, and the same command carries on\n"
     events = []
     simgap.run(suite("Mean", "Hangs", timeout=1), out=out, progress=events.append)
-    assert "1 of 2 jobs are done already and were not run again" in [event.note for event in events]
+    assert "1 of 2 jobs are done already and were not run again" in [event.message for event in events]
 
 
 def test_the_workers_of_a_killed_run_end_too(suite, tmp_path):
