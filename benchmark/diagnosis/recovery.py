@@ -48,8 +48,8 @@ class Grid:
                 raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(RIGS)}")
         for seed, rig in product(range(self.seeds), chosen):
             effects = (*suitable(rig), *suitable(rig, outside=True))
-            for effect, *settings in product(effects, self.strengths, self.noises, self.colours):
-                yield Case(rig, effect, *map(float, settings), seed)
+            for effect, strength, noise, colour in product(effects, self.strengths, self.noises, self.colours):
+                yield Case(rig, effect, strength, noise, colour, seed)
         rng = np.random.default_rng(1)
         for i in range(self.pairs):
             rig = str(rng.choice(chosen))
