@@ -224,7 +224,7 @@ def examine(candidate: Candidate) -> Iterator[CheckResult]:
             yield CheckResult(sentence)
 
 
-def _alike(found: np.ndarray, expected: np.ndarray, tolerance: float, otherwise: str) -> None:
-    difference = np.abs(found - expected)
-    if found.size and not (difference <= tolerance * (1 + np.abs(expected))).all():
+def _alike(actual: np.ndarray, expected: np.ndarray, tolerance: float, otherwise: str) -> None:
+    difference = np.abs(actual - expected)
+    if actual.size and not (difference <= tolerance * (1 + np.abs(expected))).all():
         raise ModelFault(f"{otherwise} (largest difference {np.nanmax(difference):.3g})")

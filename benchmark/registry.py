@@ -25,7 +25,7 @@ def origin(target: Any) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class _Entry:
-    """Where a name was found, and the first line of its docstring."""
+    """The module that registers a name, and the first line of its docstring."""
 
     module: str
     title: str
@@ -42,7 +42,7 @@ class Registry:
     kind: str
     packages: tuple[str, ...]
     constant: str
-    _found: dict[str, Any] = field(default_factory=dict)
+    _targets: dict[str, Any] = field(default_factory=dict)
     _entries: dict[str, _Entry] | None = None
     _installed: dict[str, Any] | None = None
 
@@ -50,24 +50,24 @@ class Registry:
         """Class or function decorator that files its target under `name`; a name taken twice is an error."""
 
         def add(target: T) -> T:
-            taken = self._found.get(name)
+            taken = self._targets.get(name)
             if taken is not None and origin(taken) != origin(target):
                 raise ValueError(f"two {self.kind}s are called {name!r}: {taken!r} and {target!r}")
-            self._found[name] = target
+            self._targets[name] = target
             return target
 
         return add
 
     def name_of(self, target: Any) -> str:
         """The name under which `target` was registered. Raises UnusableInput."""
-        for name, found in self._found.items():
-            if found is target:
+        for name, registered in self._targets.items():
+            if registered is target:
                 return name
         raise UnusableInput(f"{target!r} is no registered {self.kind}")
 
     def names(self) -> list[str]:
         """All names, those of importable and of broken modules alike, in alphabetical order."""
-        return sorted({*self._index(), *self._found, *self._plugins()})
+        return sorted({*self._index(), *self._targets, *self._plugins()})
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names())
@@ -77,15 +77,15 @@ class Registry:
 
     def __getitem__(self, name: str) -> Any:
         """The thing called `name`. Raises UnusableInput for an unknown name or a module that does not import."""
-        if name in self._found:
-            return self._found[name]
+        if name in self._targets:
+            return self._targets[name]
         if name in self._index():
             module = self._index()[name].module
             try:
                 importlib.import_module(module)
             except ImportError as error:
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
-            return self._found[name]
+            return self._targets[name]
         if name in self._plugins():
             try:
                 return self._plugins()[name].load()
@@ -155,9 +155,9 @@ def _registered(path: Path, constant: str) -> Iterator[tuple[str, str]]:
         for decorator in node.decorator_list:
             match decorator:
                 case ast.Call(
-                    func=ast.Attribute(value=ast.Name(id=found), attr="register"),
+                    func=ast.Attribute(value=ast.Name(id=registry), attr="register"),
                     args=[ast.Constant(value=str(name))],
-                ) if found == constant:
+                ) if registry == constant:
                     yield name, next(iter((ast.get_docstring(node) or "").splitlines()), "")
 
 
@@ -197,6 +197,6 @@ def _only_model(module: ModuleType, reference: str) -> str:
     own = [thing for thing in vars(module).values() if getattr(thing, "__module__", "") == module.__name__]
     models = [thing.__name__ for thing in own if hasattr(thing, "fit") and hasattr(thing, "simulate")]
     if len(models) != 1:
-        found = f"the classes {', '.join(models)}" if models else "no class with the methods fit and simulate"
-        raise UnusableInput(f"--model {reference}: the file holds {found}; write it as {reference}:MyModel")
+        content = f"the classes {', '.join(models)}" if models else "no class with the methods fit and simulate"
+        raise UnusableInput(f"--model {reference}: the file holds {content}; write it as {reference}:MyModel")
     return models[0]

@@ -1,4 +1,4 @@
-"""`simgap fit`: one model on one data set, here and now."""
+"""`simgap fit`: one model on one data set, in the foreground."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def fit(
             done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
     except (UnusableInput, KeyboardInterrupt, OSError):
         raise
-    except Exception as error:  # the model's own fault, told without our traceback
+    except Exception as error:  # the model's own fault, without our traceback
         typer.echo(f"simgap: {fitting.reason('fit', error)}", err=True)
         raise typer.Exit(1) from None
     if json is not None:
@@ -64,7 +64,7 @@ def fit(
 
 @contextmanager
 def _progress(console: rich.console.Console) -> Iterator[None]:
-    """A bar with the time left for models that say how far they are, on a terminal."""
+    """Show a bar with the time left for models that say how far they are, on a terminal."""
     from rich.progress import Progress
 
     from simgap.protocol import listen
@@ -81,10 +81,10 @@ def _progress(console: rich.console.Console) -> Iterator[None]:
             listen(None)
 
 
-def _told(value: object) -> str:
+def _short_text(value: object) -> str:
     """What a fit chose, for people."""
     if isinstance(value, dict):
-        return " ".join(f"{name} {_told(part)}" for name, part in value.items())
+        return " ".join(f"{name} {_short_text(part)}" for name, part in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -96,7 +96,7 @@ def _print_model(console: rich.console.Console, done: Fit) -> None:
         short = {
             name: value for name, value in first.fitted.items() if not (isinstance(value, list) and len(value) > MANY)
         }
-        lines.append("chosen: " + ", ".join(f"{name} = {_told(value)}" for name, value in short.items()))
+        lines.append("chosen: " + ", ".join(f"{name} = {_short_text(value)}" for name, value in short.items()))
     summary = getattr(done.model, "summary", None)
     if callable(summary):
         lines.append(str(summary()))

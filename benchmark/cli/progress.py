@@ -1,4 +1,4 @@
-"""How far a run is, on the terminal."""
+"""Show the progress of a run on the terminal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Summary = Callable[[tuple[Any, ...]], str]
 
 @contextmanager
 def shown(console: rich.console.Console, summary: Summary) -> Iterator[Listener]:
-    """A bar with the time left on a terminal, a plain line per finished job elsewhere.
+    """Show a bar with the time left on a terminal, a plain line per finished job elsewhere.
 
     Ctrl-C ends the command with exit code 130 and a sentence.
     """
@@ -59,8 +59,8 @@ def _bar(console: rich.console.Console, summary: Summary) -> Iterator[Listener]:
 
 
 def _print_line(console: rich.console.Console, progress: Progress, summary: Summary) -> None:
-    if progress.note:
-        console.print(progress.note, markup=False, highlight=False)
+    if progress.message:
+        console.print(progress.message, markup=False, highlight=False)
     if progress.finished:
         from simgap.reports.rendering import printable
 

@@ -48,8 +48,8 @@ class Grid:
                 raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(RIGS)}")
         for seed, rig in product(range(self.seeds), chosen):
             effects = (*suitable(rig), *suitable(rig, outside=True))
-            for effect, *settings in product(effects, self.strengths, self.noises, self.colours):
-                yield Case(rig, effect, *map(float, settings), seed)
+            for effect, strength, noise, colour in product(effects, self.strengths, self.noises, self.colours):
+                yield Case(rig, effect, strength, noise, colour, seed)
         rng = np.random.default_rng(1)
         for i in range(self.pairs):
             rig = str(rng.choice(chosen))
@@ -108,7 +108,7 @@ def recovery(
     known = {row.case: row for row in read(file) if row.status == "ok" and row.code_sha256 == digest}
     todo = [CaseJob(case, digest) for case in cases if case not in known]
     if len(todo) < len(cases):
-        execution.note(f"{len(cases) - len(todo)} of {len(cases)} cases are done already and were not run again")
+        execution.send(f"{len(cases) - len(todo)} of {len(cases)} cases are done already and were not run again")
 
     def keep(rows: Sequence[CaseResult]) -> None:
         text = "".join(json.dumps(store.plain(asdict(row)), allow_nan=False) + "\n" for row in rows)

@@ -89,15 +89,15 @@ def compare(suite: str, before: Sequence[Result], after: Sequence[Result]) -> li
     """All comparisons of a suite, model by model and data set by data set."""
     theirs, ours = _grouped(before), _grouped(after)
     seeds = {row.seed for row in after}
-    found: list[Comparison] = []
+    comparisons: list[Comparison] = []
     for group, rows in theirs.items():
         model, _, dataset = group
-        group_of = _Group(suite, model, dataset, rows, ours.get(group, []))
-        found += group_of.row_by_row(seeds)
-        found += group_of.on_average()
+        compared = _Group(suite, model, dataset, rows, ours.get(group, []))
+        comparisons += compared.row_by_row(seeds)
+        comparisons += compared.on_average()
     for group in ours.keys() - theirs.keys():
-        found.append(Comparison(suite, group[0], group[2], ON_AVERAGE, None, None, None, math.inf, "new"))
-    return found
+        comparisons.append(Comparison(suite, group[0], group[2], ON_AVERAGE, None, None, None, math.inf, "new"))
+    return comparisons
 
 
 @dataclass(frozen=True)
@@ -184,14 +184,14 @@ class _Group:
 
 def _figures(row: Result) -> dict[FigureName, tuple[float, float]]:
     """Every RMSE of a row with the spread of what was measured: of the whole record, and at each horizon."""
-    found: dict[FigureName, tuple[float, float]] = {}
+    rmse: dict[FigureName, tuple[float, float]] = {}
     for output, figures in row.metrics.items():
         scale = float(figures.get("std", 0.0))
         if "rmse" in figures:
-            found[row.experiment, row.task, output] = float(figures["rmse"]), scale
+            rmse[row.experiment, row.task, output] = float(figures["rmse"]), scale
         for horizon, value in figures.get("rmse_by_horizon", {}).items():
-            found[row.experiment, row.task, f"{output} {horizon} ahead"] = float(value), scale
-    return found
+            rmse[row.experiment, row.task, f"{output} {horizon} ahead"] = float(value), scale
+    return rmse
 
 
 def _means(rows: Sequence[Result]) -> dict[int, float]:

@@ -1,4 +1,4 @@
-"""Work on an engine: its rows are stored as soon as they are there, and a listener hears how far it is."""
+"""Work on an engine: its rows are stored as soon as they are there, and a listener is called with the progress."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from simgap.running.workers import Limits
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is. `finished` holds the rows of the job that has just ended, if one has."""
+    """The progress of a run. `finished` holds the rows of the job that has just ended, if one has."""
 
     done: int = 0
     total: int = 0
     running: tuple[str, ...] = ()
     finished: tuple[Any, ...] = ()
-    note: str = ""
+    message: str = ""
     share: float = 0.0  # of all jobs, those under way counted as far as they say they are
 
 
 Listener = Callable[[Progress], None]
 
 
-def log_notes(progress: Progress) -> None:
-    """Log what a run notes, for those who do not listen."""
-    if progress.note:
-        logging.getLogger("simgap").warning(progress.note)
+def log_messages(progress: Progress) -> None:
+    """Log the messages of a run, for callers without a listener of their own."""
+    if progress.message:
+        logging.getLogger("simgap").warning(progress.message)
 
 
 @dataclass(frozen=True)
 class Execution:
-    """Where work is done, how much of it at a time, the folder of its rows, and who hears how far it is.
+    """Where work is done, how much of it at a time, the folder of its rows, and who gets the progress.
 
     `options` are those of some engines only, such as the address of a cluster; None for one that was not given.
     """
@@ -48,11 +48,11 @@ class Execution:
     jobs: int = 1
     options: dict[str, Any] = field(default_factory=dict)
     out: Path = Path("results")
-    listener: Listener = log_notes
+    listener: Listener = log_messages
 
-    def note(self, text: str) -> None:
-        """Have the listener hear a sentence."""
-        self.listener(Progress(note=text))
+    def send(self, text: str) -> None:
+        """Send a sentence to the listener."""
+        self.listener(Progress(message=text))
 
     @property
     def threads(self) -> int:
@@ -79,7 +79,7 @@ class Execution:
 def carry_out(
     engine: Engine, todo: Sequence[Work], keep: Callable[[list[Any]], None], listener: Listener
 ) -> list[list[Any]]:
-    """The rows of all work in the order in which it ended; `keep` stores those of each as soon as they are there."""
+    """Execute all work; its rows, in the order in which it ended. `keep` stores those of each as soon as they come."""
     ended: list[list[Any]] = []
     with contextlib.closing(engine(todo)) as events:
         for event in events:

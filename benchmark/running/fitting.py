@@ -52,7 +52,7 @@ def fit(
     outputs: Sequence[str] = (),
     dt: float | None = None,
 ) -> Fit:
-    """Fit one model to one data set, here and now, and score it on the test experiments.
+    """Fit one model to one data set in this process, and score it on the test experiments.
 
     `model` is a registered name or `file.py:Class`; `data` a data set, or what `simgap.load` takes; dt in
     seconds. Raises UnusableInput, and whatever the model's own `fit` raises.
@@ -71,7 +71,7 @@ def fit(
 
 
 def load_model(folder: str | Path) -> Any:
-    """The network that its `save` or `simgap fit --save` wrote into a folder. Nothing in the files is executed.
+    """Load the network that its `save` or `simgap fit --save` wrote into a folder. Nothing in the files is executed.
 
     Raises UnusableInput.
     """
@@ -90,12 +90,12 @@ def load_model(folder: str | Path) -> Any:
 
 
 def model_class(reference: str) -> type:
-    """The class of a registered name, of `file.py:Class`, or of a `file.py` that holds one. Raises UnusableInput."""
-    found = load_class(reference) if ".py:" in reference or reference.endswith(".py") else MODELS[reference]
+    """Find the class of a registered name, of `file.py:Class`, or of a `file.py` with one. Raises UnusableInput."""
+    kind = load_class(reference) if ".py:" in reference or reference.endswith(".py") else MODELS[reference]
     for method in ("fit", "simulate"):
-        if not callable(getattr(found, method, None)):
+        if not callable(getattr(kind, method, None)):
             raise UnusableInput(f"{reference} is no model: it has no method {method}")
-    return found
+    return kind
 
 
 def check_params(reference: str, params: dict[str, Any]) -> None:
@@ -109,7 +109,7 @@ def check_params(reference: str, params: dict[str, Any]) -> None:
 
 
 def build(reference: str, params: dict[str, Any]) -> Model:
-    """A model that is not fitted yet. Raises UnusableInput."""
+    """Build a model that is not fitted yet. Raises UnusableInput."""
     check_params(reference, params)
     return model_class(reference)(**params)
 
@@ -143,7 +143,7 @@ def _chosen(model: Model) -> dict[str, Any]:
 
 
 def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Result) -> list[Result]:
-    """One result per test experiment and task. A model that fails on one is still asked for the others."""
+    """Score every test experiment for every task. A model that fails on one is still asked for the others."""
     results = []
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
@@ -202,7 +202,7 @@ class CheckedSimulation:
 
 
 def reason(method: str, error: BaseException) -> str:
-    """One line for people: what went wrong in a method of a model, and in which line of whose file."""
+    """Say in one line what went wrong in a method of a model, and in which line of whose file."""
     try:
         text = _shortened(" ".join(str(error).split()))
     except Exception as worse:  # of an exception that cannot even say what it is

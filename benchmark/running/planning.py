@@ -16,7 +16,7 @@ from simgap.running.jobs import SLOW_IMPORTS, Card, Job, LoadArguments, model_co
 from simgap.running.source import Code
 from simgap.running.suites import Entry, Suite
 
-Note = Callable[[str], None]
+Message = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Choice:
     load_arguments: tuple[LoadArguments, ...] = ()
 
 
-def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
-    """The models to run: those that the user named, or else the suite's.
+def choose_entries(suite: Suite, choice: Choice, message: Message) -> list[Entry]:
+    """List the models to run: those that the user named, or else the suite's.
 
-    A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
+    A name may be a label of the suite. One of the suite's that cannot be imported is left out with a message; one
     that the user named raises UnusableInput.
     """
     by_label = {entry.label: entry for entry in suite.models}
@@ -43,7 +43,7 @@ def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
         except UnusableInput as error:
             if named:
                 raise
-            note(f"left out: {error}")
+            message(f"left out: {error}")
         else:
             entries.append(entry)
     keys = [(entry.label, str(plain(entry.params))) for entry in entries]
@@ -65,10 +65,10 @@ def load_arguments(
     ]
 
 
-def choose_data(suite: Suite, named: Sequence[LoadArguments], note: Note) -> list[tuple[LoadArguments, Card]]:
-    """The data sets to run on, with their cards: those the user named, or else the suite's.
+def choose_data(suite: Suite, named: Sequence[LoadArguments], message: Message) -> list[tuple[LoadArguments, Card]]:
+    """Load the data sets to run on and keep their cards: those the user named, or else the suite's.
 
-    One of the suite's that is not at hand is noted and left out; one the user named raises UnusableInput.
+    One of the suite's that is not at hand is left out with a message; one the user named raises UnusableInput.
     """
     chosen = []
     for arguments in named or [LoadArguments(name) for name in suite.datasets]:
@@ -77,7 +77,7 @@ def choose_data(suite: Suite, named: Sequence[LoadArguments], note: Note) -> lis
         except UnusableInput as error:
             if named or arguments.data not in DATASETS:
                 raise
-            note(f"left out: {error}")
+            message(f"left out: {error}")
     names = [card.name for _, card in chosen]
     if twice := [name for name in names if names.count(name) > 1]:
         raise UnusableInput(f"two data sets are called {twice[0]}; give one of them another name")
@@ -89,7 +89,7 @@ def choose_data(suite: Suite, named: Sequence[LoadArguments], note: Note) -> lis
 def plan(
     suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[LoadArguments, Card]], provenance: dict[str, Any]
 ) -> list[Job]:
-    """All jobs, one data set after the other.
+    """List all jobs, one data set after the other.
 
     Each carries a digest of its model's code: results of the old code must not stand for the new.
     """
@@ -109,7 +109,7 @@ def _slow_imports(code: Code) -> tuple[str, ...]:
 
 
 def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.Key, Result]:
-    """The stored results of these jobs' models that need not be computed again, by key."""
+    """Read the stored results of these jobs' models that need not be computed again, by key."""
     rows = {}
     for label in {job.entry.label for job in jobs}:
         path = store.path_of(folder, suite.name, label)
@@ -118,13 +118,13 @@ def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.K
 
 
 def done_already(job: Job, rows: dict[store.Key, Result]) -> list[Result]:
-    """The job's results if all of them are stored and came from the same data and code of the model, else none."""
-    found = [rows.get(store.key(owed)) for owed in job.owed()]
+    """Return the job's results if all are stored and came from the same data and code of the model, else none."""
+    stored = [rows.get(store.key(owed)) for owed in job.owed()]
     wanted = {name: job.about.provenance.get(name) for name in ("data_sha256", "model_sha256")}
-    for row in found:
+    for row in stored:
         if row is None or any(row.provenance.get(name) != digest for name, digest in wanted.items()):
             return []
-    return [row for row in found if row is not None]
+    return [row for row in stored if row is not None]
 
 
 def with_seeds(suite: Suite, seeds: int | None) -> Suite:

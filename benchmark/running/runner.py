@@ -8,7 +8,7 @@ from pathlib import Path
 from simgap.records import Result
 from simgap.results import store
 from simgap.running import planning
-from simgap.running.execution import Execution, Listener, carry_out, log_notes
+from simgap.running.execution import Execution, Listener, carry_out, log_messages
 from simgap.running.jobs import Job
 from simgap.running.planning import Choice
 from simgap.running.provenance import provenance
@@ -40,20 +40,20 @@ def run(
     """
     files = planning.load_arguments(_listed(datasets), _listed(inputs), _listed(outputs), dt)
     choice = Choice(tuple(_listed(models)), tuple(_listed(model)), tuple(files))
-    execution = Execution(engine, jobs, {"address": address}, Path(out), progress or log_notes)
+    execution = Execution(engine, jobs, {"address": address}, Path(out), progress or log_messages)
     return run_suite(planning.with_seeds(load_suite(suite), seeds), choice, execution)
 
 
 def run_suite(suite: Suite, choice: Choice, execution: Execution) -> list[Result]:
     """Run those of a suite's jobs that the user chose and that are not stored. Raises UnusableInput."""
     engine = execution.start(suite.timeout, suite.memory)
-    entries = planning.choose_entries(suite, choice, execution.note)
-    data = planning.choose_data(suite, choice.load_arguments, execution.note)
+    entries = planning.choose_entries(suite, choice, execution.send)
+    data = planning.choose_data(suite, choice.load_arguments, execution.send)
     planned = planning.plan(suite, entries, data, provenance(execution.threads))
     folder = store.writable(execution.out)
     results, todo = _split(planned, planning.stored_rows(planned, folder, suite))
     if len(todo) < len(planned):
-        execution.note(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")
+        execution.send(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")
     for rows in carry_out(engine, todo, lambda rows: store.append(folder, suite.name, rows), execution.listener):
         results += rows
     for label in {job.entry.label for job in planned}:

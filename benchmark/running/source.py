@@ -45,17 +45,17 @@ class _Module:
 
 
 def code_of(classes: Iterable[type]) -> Code:
-    """All code that the classes stand on: modules of simgap, and for a user's class those beside its own file."""
+    """Collect the code that the classes stand on: modules of simgap, and those beside the file of a user's class."""
     code = Code({}, frozenset())
     for kind in classes:
         file, name = Path(inspect.getfile(kind)), kind.__module__
-        found = closure({name: file}, root=None if _is_simgap(name) else file.parents[name.count(".")])
-        code = Code(code.digests | found.digests, code.outside | found.outside)
+        added = closure({name: file}, root=None if _is_simgap(name) else file.parents[name.count(".")])
+        code = Code(code.digests | added.digests, code.outside | added.outside)
     return code
 
 
 def closure(start: dict[str, Path | None], root: Path | None = None, within: tuple[str, ...] = ("simgap",)) -> Code:
-    """What the modules in `start` import, directly or by way of others, function-level imports included.
+    """Collect what the modules in `start` import, directly or by way of others, function-level imports included.
 
     `start` maps a name to its file, None for a module of simgap. `root` is the folder in which a user's own modules
     are looked up; beside an installed package, only its own. `within` are the packages of simgap that are followed;
@@ -133,10 +133,10 @@ def _of_simgap(name: str) -> Path | None:
     """The file of a module or package of simgap, whose folders are no tree of packages."""
     parent, _, last = name.rpartition(".")
     folder = _folder(parent)
-    found = _in_folder(folder, [last]) if folder else None
-    if found is None and parent in ("", "simgap") and (folder := _folder(name)):
+    file = _in_folder(folder, [last]) if folder else None
+    if file is None and parent in ("", "simgap") and (folder := _folder(name)):
         return folder / "__init__.py"
-    return found
+    return file
 
 
 @cache

@@ -34,7 +34,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Suite:
-    """What `simgap run` does unless told otherwise; seconds and GiB are those of a fit with its simulations."""
+    """What `simgap run` does without options; seconds and GiB are those of a fit with its simulations."""
 
     name: str
     title: str

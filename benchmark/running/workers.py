@@ -35,17 +35,17 @@ class Limits:
 
 
 def prepare_worker(limits: Limits) -> None:
-    """Limit threads and memory of this process, have nobody hear it, and end it when its parent ends."""
+    """Limit threads and memory of this process, discard what it prints, and end it when its parent ends."""
     limit_threads(limits.threads)
     limit_memory(limits.memory)
-    keep_memory()
+    reuse_memory()
     silence()
     os.environ.update(limits.environment)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def threads_per_worker(workers: int) -> int:
-    """The machine's cores shared out among the workers, at least one each."""
+    """Share the machine's cores out among the workers, at least one each."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, cores // workers)
 
@@ -86,11 +86,11 @@ def limit_memory(gib: float) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted if most < 0 else min(wanted, most), most))
 
 
-def keep_memory() -> None:
+def reuse_memory() -> None:
     """Have malloc keep the arrays that are freed for those that come next, where it can be told to (glibc).
 
     It would give each of more than some hundred kB back to the system, which fills a new one with zeros page by page:
-    a quarter of the time of some fits. The process ends with its job, so that nothing is kept for long.
+    a quarter of the time of some fits. The process ends with its job, and returns all of it then.
     """
     trim_threshold, top_pad, mmap_threshold = -1, -2, -3  # malloc.h
     with contextlib.suppress(OSError, AttributeError, TypeError):
@@ -101,7 +101,7 @@ def keep_memory() -> None:
 
 
 def silence() -> None:
-    """What a model prints goes nowhere: megabytes of it would hide the progress, or fill a pipe that nobody reads."""
+    """Discard what a model prints: megabytes of it would hide the progress, or fill a pipe that nobody reads."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)
@@ -109,7 +109,7 @@ def silence() -> None:
 
 
 def _end_with_parent() -> None:
-    """A run that is killed cannot stop its workers, and a model that hangs would hang on for ever."""
+    """End this process when its parent ends: a run that is killed cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

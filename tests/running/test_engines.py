@@ -45,7 +45,7 @@ def third(tmp_path, monkeypatch):
     monkeypatch.setattr(ENGINES, "packages", (*ENGINES.packages, "their_engines"))
     monkeypatch.setattr(ENGINES, "_entries", None)
     yield
-    ENGINES._found.pop("in-turn", None)
+    ENGINES._targets.pop("in-turn", None)
     sys.modules.pop("their_engines.in_turn", None)
     ENGINES._entries = None
 

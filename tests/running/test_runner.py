@@ -14,11 +14,6 @@ import simgap
 from simgap.data import save
 from simgap.records import Dataset, UnusableInput
 from simgap.results import store
-from simgap.running import planning
-from simgap.running.engines.local import Local
-from simgap.running.provenance import provenance
-from simgap.running.suites import load_suite
-from simgap.running.workers import Limits
 
 
 def by_model(results):
@@ -101,7 +96,7 @@ def test_a_second_run_computes_only_what_is_missing(suite, tmp_path):
     first = simgap.run(suite("Mean"), out=tmp_path / "out")
     second = simgap.run(suite("Mean", "Scaled"), seeds=2, out=tmp_path / "out", progress=events.append)
     assert [row for row in second if row.model == "Mean" and row.seed == 0] == first
-    assert "1 of 4 jobs are done already and were not run again" in [event.note for event in events]
+    assert "1 of 4 jobs are done already and were not run again" in [event.message for event in events]
     assert max(event.total for event in events) == 3
 
 
@@ -144,38 +139,6 @@ def test_a_changed_model_file_is_run_again(suite, tmp_path, folder):
         rows = simgap.run("smoke", model=[f"{file}:Mine"], datasets=[str(folder)], out=tmp_path / "out")
         mae = rows[0].metrics["phi"]["mae"]
     assert mae > 1.5
-
-
-def test_threads_are_shared_out_among_the_workers(suite, tmp_path):
-    rows = simgap.run(suite("Threads"), jobs=1000, out=tmp_path / "out")
-    assert rows[0].fitted == {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    assert rows[0].provenance["threads"] == 1
-
-
-def test_a_row_has_the_threads_that_its_job_had_and_not_those_that_were_planned(suite, folder):
-    chosen = load_suite(suite("Mean"))
-    (job,) = planning.plan(chosen, chosen.models, planning.choose_data(chosen, (), print), provenance(7))
-    (rows,) = [event for event in Local(1, Limits(1))([job]) if isinstance(event, list)]
-    assert {row.provenance["threads"] for row in rows} == {1}
-
-
-def test_a_fit_in_the_foreground_says_how_many_threads_it_had(folder, example):
-    import numba
-    from threadpoolctl import threadpool_limits
-
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
-        with threadpool_limits(1):
-            rows = simgap.fit(example("Mean"), folder).results
-    finally:
-        numba.set_num_threads(before)
-    assert {row.provenance["threads"] for row in rows} == {1}
-
-
-def test_a_model_that_compiles_with_numba_has_its_share_of_threads(suite, tmp_path):
-    (row, *_) = simgap.run(suite("Compiles"), jobs=1000, out=tmp_path / "out")
-    assert (row.status, row.fitted) == ("ok", {"three": 3.0, "threads": 1})
 
 
 def test_what_the_user_names_replaces_what_the_suite_lists(suite, tmp_path, example, folder):
@@ -232,7 +195,7 @@ def test_missing_data_of_a_suite_are_noted_and_missing_data_of_the_user_refused(
     path = suite("Mean", datasets='["cascaded_tanks", "noise"]')
     rows = simgap.run(path, out=tmp_path / "out", progress=events.append)
     assert {row.dataset for row in rows} == {"noise"}
-    assert any(event.note.startswith("left out: cascaded_tanks is not at hand") for event in events)
+    assert any(event.message.startswith("left out: cascaded_tanks is not at hand") for event in events)
     with pytest.raises(UnusableInput, match="cascaded_tanks is not at hand"):
         simgap.run(path, datasets=["cascaded_tanks"], out=tmp_path / "out")
     with pytest.raises(UnusableInput, match="none of the data sets"):
@@ -271,7 +234,7 @@ def test_an_interrupted_run_keeps_what_is_done_and_carries_on(suite, tmp_path):
     assert complaint == "interrupted; what is done is stored, and the same command carries on\n"
     events = []
     simgap.run(suite("Mean", "Hangs", timeout=1), out=out, progress=events.append)
-    assert "1 of 2 jobs are done already and were not run again" in [event.note for event in events]
+    assert "1 of 2 jobs are done already and were not run again" in [event.message for event in events]
 
 
 def test_the_workers_of_a_killed_run_end_too(suite, tmp_path):
