@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from simgap.baselines.estimation.armax_search import estimate_armax
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
 from simgap.baselines.estimation.orders import Order, Orders
-from simgap.baselines.estimation.prediction_error import estimate_armax
 from simgap.records import Experiment
 from simgap.registry import MODELS
 

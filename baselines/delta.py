@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from simgap.protocol import is_stochastic
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -36,9 +37,9 @@ class Delta:
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """The simulated differences, summed up from the last of the n measured samples.
+        """Sum up the simulated differences from the last of the n measured samples.
 
-        Before a single sample the machine is taken to have stood still.
+        Before a single sample the plant is taken to have stood still.
         """
         if y_init.shape[1] == 1:
             differences = self.inner.simulate(u, np.zeros_like(y_init))
@@ -47,13 +48,18 @@ class Delta:
         return y_init[:, -1:] + np.cumsum(differences, axis=1)
 
     @property
+    def stochastic(self) -> bool:
+        """Whether the other model is."""
+        return is_stochastic(self.inner)
+
+    @property
     def n_params(self) -> int | None:
-        """Those of the other model."""
+        """Number of parameters of the inner model."""
         return getattr(self.inner, "n_params", None)
 
     @property
     def fitted(self) -> dict[str, Any]:
-        """What the other model chose."""
+        """What the inner model chose for itself."""
         return getattr(self.inner, "fitted", {})
 
 

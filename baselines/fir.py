@@ -18,7 +18,7 @@ from simgap.registry import MODELS
 class Fir(LinearModel):
     """y(t) = B(q) u(t) + e(t), nb coefficients from delay nk, by least squares (Ljung 1999, eq. 4.46 with F = 1).
 
-    Without nb the length is selected from 5 to 160. A machine that integrates has no finite response; see arx, oe.
+    Without nb the length is selected from 5 to 160. A plant that integrates has no finite response; see arx, oe.
     """
 
     nb: Order | None = None

@@ -19,7 +19,7 @@ class Hold:
     n_params = 0
 
     def fit(self, data: TrainingSet, seed: int) -> None:
-        """There is nothing to estimate."""
+        """Estimate nothing: the model has no parameter."""
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]

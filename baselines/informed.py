@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from simgap.baselines.greybox import GreyBox
 from simgap.baselines.greybox_auto import GreyBoxAuto
+from simgap.protocol import is_stochastic
 from simgap.records import Channel, Channels, Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -57,6 +58,11 @@ class Informed:
         for plant in self.grey.plants:
             columns.append(plant.contributions(u, y_init[:, :, list(plant.outputs)]))
         return np.concatenate(columns, axis=2)
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether the other model is; the grey box is not."""
+        return is_stochastic(self.model)
 
     @property
     def n_params(self) -> int:

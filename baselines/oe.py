@@ -8,8 +8,8 @@ from typing import Literal
 
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.linear import Criterion, Estimator, LinearModel, check_together
+from simgap.baselines.estimation.oe_search import estimate_oe
 from simgap.baselines.estimation.orders import Order, Orders
-from simgap.baselines.estimation.output_error import estimate_oe
 from simgap.records import Experiment
 from simgap.registry import MODELS
 

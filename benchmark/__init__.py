@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from simgap.registry import DATASETS, EFFECTS, MODELS
     from simgap.reports.leaderboard import report
     from simgap.results.regression import Regression, check
+    from simgap.running.execution import Progress
     from simgap.running.fitting import Fit, fit, load_model
-    from simgap.running.runner import Progress, run
+    from simgap.running.runner import run
     from simgap.running.suites import Suite, load_suite
 
 _HOME = {
@@ -29,7 +30,8 @@ _HOME = {
     "simgap.results.regression": ("Regression", "check"),
     "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
     "simgap.reports.leaderboard": ("report",),
-    "simgap.running.runner": ("Progress", "run"),
+    "simgap.running.execution": ("Progress",),
+    "simgap.running.runner": ("run",),
     "simgap.running.suites": ("Suite", "load_suite"),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

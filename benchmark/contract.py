@@ -101,6 +101,8 @@ def it_fits_and_says_plainly_what_it_chose(candidate: Candidate) -> None:
     if not isinstance(fitted := getattr(model, "fitted", None) or {}, dict):
         raise ModelFault(f"fitted is a {type(fitted).__name__}; make it a dict of what the fit chose")
     json.dumps(plain(fitted), allow_nan=False)
+    if not isinstance(stochastic := getattr(model, "stochastic", False), bool):
+        raise ModelFault(f"stochastic is {stochastic!r}; make it True where another seed gives other numbers")
 
 
 def it_returns_the_rows_after_the_start_as_float64(candidate: Candidate) -> None:
@@ -201,25 +203,25 @@ CHECKS: tuple[Check, ...] = (
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What one check found; `wrong` is empty if all is well."""
+class CheckResult:
+    """The name of a check, and what is wrong; empty if all is well."""
 
     check: str
     wrong: str = ""
 
 
-def examine(candidate: Candidate) -> Iterator[Verdict]:
+def examine(candidate: Candidate) -> Iterator[CheckResult]:
     """Run the checks one after the other; a model that cannot even be fitted is not asked for more."""
     for check in CHECKS:
         sentence = check.__name__.replace("_", " ")
         try:
             check(candidate)
         except (ModelFault, UnusableInput) as error:
-            yield Verdict(sentence, str(error))
+            yield CheckResult(sentence, str(error))
             if "fitted" not in candidate.__dict__:
                 return
         else:
-            yield Verdict(sentence)
+            yield CheckResult(sentence)
 
 
 def _alike(found: np.ndarray, expected: np.ndarray, tolerance: float, otherwise: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -16,8 +16,10 @@ class Model(Protocol):
     """A model of a machine, fitted to measured data and simulated without them.
 
     Hyper-parameters are the fields of a dataclass; `fit` starts from nothing each time it is called.
-    Three attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
-    what the fit chose (an order, say) that goes into the results; `summary()`, a text for people.
+    Four attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
+    what the fit chose (an order, say) that goes into the results; `summary()`, a text for people; `stochastic`, True
+    where another seed gives other numbers, as with a network trained from random weights (default False). It goes
+    into the results, and `simgap check` then grants the spread of the seeds instead of a rounding error.
     """
 
     def fit(self, data: TrainingSet, seed: int) -> None:
@@ -33,6 +35,11 @@ class Model(Protocol):
         forecast is many short ones.
         """
         ...
+
+
+def is_stochastic(model: Any) -> bool:
+    """Whether a model, or its class, declares that its numbers depend on the seed."""
+    return getattr(model, "stochastic", False) is True
 
 
 _listener: Callable[[int, int], None] | None = None

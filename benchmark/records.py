@@ -16,6 +16,9 @@ Status = Literal["ok", "diverged", "error", "timeout"]
 # No measurement is larger; squares and sums of squares of such values still fit into float64.
 LARGEST_VALUE = 1e100
 
+# Relative difference of two sampling times that is the jitter of one clock: each is read off time stamps of a record.
+CLOCK_JITTER = 1e-4
+
 
 class UnusableInput(ValueError):
     """What the user gave cannot be used; the message is one sentence that says where and what to do."""
@@ -171,6 +174,11 @@ class Dataset:
         return digest.hexdigest()
 
 
+def same_sampling_time(one: float, other: float) -> bool:
+    """Whether two sampling times in seconds are the same but for the jitter of a clock."""
+    return abs(one - other) <= CLOCK_JITTER * max(one, other)
+
+
 def _check_alike(experiments: tuple[Experiment, ...], channels: Channels) -> None:
     nu, ny, dt = len(channels.inputs), len(channels.outputs), experiments[0].dt
     if nu < 1 or ny < 1:
@@ -181,7 +189,7 @@ def _check_alike(experiments: tuple[Experiment, ...], channels: Channels) -> Non
                 f"{experiment.name}: {experiment.u.shape[1]} inputs and {experiment.y.shape[1]} outputs, "
                 f"where {nu} and {ny} are declared; every experiment needs the same columns"
             )
-        if abs(experiment.dt - dt) > 1e-9 * dt:
+        if not same_sampling_time(experiment.dt, dt):
             raise UnusableInput(
                 f"{experiment.name}: sampled every {experiment.dt} s, the first experiment every {dt} s; "
                 f"resample them to one sampling time first"

@@ -1,4 +1,4 @@
-"""Names for models and data sets. A new one is one new file with one decorator."""
+"""Names for models, effects, data sets and engines. A new one is one new file with one decorator."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ class Registry:
     constant: str
     _found: dict[str, Any] = field(default_factory=dict)
     _entries: dict[str, _Entry] | None = None
+    _installed: dict[str, Any] | None = None
 
     def register(self, name: str) -> Callable[[T], T]:
         """Class or function decorator that files its target under `name`; a name taken twice is an error."""
@@ -120,7 +121,10 @@ class Registry:
         return ""
 
     def _plugins(self) -> dict[str, Any]:
-        return {point.name: point for point in entry_points(group=f"simgap.{self.kind.replace(' ', '')}s")}
+        if self._installed is None:
+            group = f"simgap.{self.kind.replace(' ', '')}s"
+            self._installed = {point.name: point for point in entry_points(group=group)}
+        return self._installed
 
     def _index(self) -> dict[str, _Entry]:
         if self._entries is None:
@@ -159,6 +163,7 @@ def _registered(path: Path, constant: str) -> Iterator[tuple[str, str]]:
 
 MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")
 EFFECTS = Registry("effect", ("simgap.greybox.effects",), "EFFECTS")
+ENGINES = Registry("engine", ("simgap.running.engines",), "ENGINES")
 DATASETS = Registry(
     "dataset", ("simgap.data.measured", "simgap.data.simulated", "simgap.data.simulated.gimbal"), "DATASETS"
 )

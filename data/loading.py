@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import check_columns
-from simgap.data.formats.folder import experiment_of, load_folder
+from simgap.data.formats.folder import load_folder
 from simgap.data.formats.sampling import check_time, sampling_time
-from simgap.data.formats.tables import Table, read_csv
+from simgap.data.formats.tables import Table
 from simgap.data.splits import assemble, split_in_time
 from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
 from simgap.registry import DATASETS
@@ -25,7 +26,7 @@ def load(
     dt: float | None = None,
     name: str | None = None,
 ) -> Dataset:
-    """The data set behind a registered name, a folder with dataset.toml, a CSV file or a pandas DataFrame.
+    """Load a data set: a registered name, a folder with dataset.toml, a CSV file or a pandas DataFrame.
 
     A CSV file and a DataFrame are one record: `inputs` and `outputs` name its columns, the sampling time is
     that of the column "t" or "time" or `dt` in seconds, and the record is split in time 60/20/20.
@@ -69,7 +70,7 @@ def _dataset_of(table: Table, inputs: Sequence[str], outputs: Sequence[str], dt:
     for column in (*inputs, *outputs):
         table.cells_of(column)  # a misspelt column is a better answer than a missing sampling time
     channels = Channels(tuple(map(Channel, inputs)), tuple(map(Channel, outputs)))
-    record = experiment_of(table, "record", channels, _sampling_time(table, {*inputs, *outputs}, dt))
+    record = table.experiment("record", channels, _sampling_time(table, {*inputs, *outputs}, dt))
     return assemble(name, split_in_time(record), channels, None, table.source)
 
 

@@ -1,4 +1,4 @@
-"""Splits in time, never glued and never shuffled, and the checks that every data set passes on the way in."""
+"""Splits in time, never joined and never shuffled, and the checks that every data set passes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ LARGEST_DEFAULT_N_INIT = 20
 
 
 def split_in_time(record: Experiment) -> tuple[Experiments, Experiments, Experiments]:
-    """The first 60 % of the record to train on, then 20 % to validate on, then 20 % to test on."""
+    """Cut a record into its first 60 % to train on, 20 % to validate on, and the last 20 % to test on."""
     a, b = len(record) * 3 // 5, len(record) * 4 // 5
     train, valid, test = record[:a], record[a:b], record[b:]
     return (replace(train, name="train"),), (replace(valid, name="valid"),), (replace(test, name="test"),)
 
 
 def hold_out_tails(records: Sequence[Experiment]) -> tuple[Experiments, Experiments]:
-    """Each record without its last quarter, and the last quarters as experiments of their own."""
+    """Cut off the last quarter of each record, as an experiment of its own."""
     cuts = [len(record) - len(record) // 4 for record in records]
     heads = tuple(record[:cut] for record, cut in zip(records, cuts, strict=True))
     tails = tuple(replace(record[cut:], name=f"{record.name}_tail") for record, cut in zip(records, cuts, strict=True))
@@ -30,7 +30,7 @@ def hold_out_tails(records: Sequence[Experiment]) -> tuple[Experiments, Experime
 
 
 def default_n_init(records: Sequence[Experiment]) -> int:
-    """A tenth of the shortest experiment, at least 1 and at most 20 samples."""
+    """Take a tenth of the shortest experiment, at least 1 and at most 20 samples."""
     return min(LARGEST_DEFAULT_N_INIT, max(1, min(map(len, records)) // 10))
 
 
@@ -41,7 +41,7 @@ def assemble(
     n_init: int | None,
     source: str,
 ) -> Dataset:
-    """A data set of training, validation and test experiments; `source` names it in the messages.
+    """Make a data set of training, validation and test experiments; `source` names it in the messages.
 
     Raises UnusableInput when an experiment is not longer than n_init or an input never moves in training.
     """

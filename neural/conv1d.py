@@ -21,5 +21,5 @@ class Conv1D(Network):
     kernel: int = 5
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         return Headed(Pooled(inputs, self.channels, self.kernel, self.window), self.channels, outputs)

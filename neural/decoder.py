@@ -19,6 +19,6 @@ class Decoder(Network):
     second: int = 16
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         layers = (recurrent(Lstm, inputs, self.first), recurrent(Lstm, self.first, self.second))
         return Headed(Recurrences(layers), self.second, outputs)

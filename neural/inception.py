@@ -23,7 +23,7 @@ class Inception(Network):
     hidden: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         branches = (
             Recurrences([recurrent(Gru, inputs, self.units)]),
             Recurrences([recurrent(Lstm, inputs, self.units)]),

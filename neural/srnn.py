@@ -18,5 +18,5 @@ class SRNN(Network):
     units: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         return Headed(Recurrences([recurrent(Srnn, inputs, self.units)]), self.units, outputs)

@@ -22,6 +22,6 @@ class TCN(Network):
     blocks: int = 4
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         body = Tcn(inputs, self.channels, self.kernel, self.blocks, self.dropout)
         return Headed(body, self.channels, outputs)

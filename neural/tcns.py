@@ -25,7 +25,7 @@ class TCNs(Network):
     hidden: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
         branches = [
             Tcn(inputs, self.channels, kernel, blocks, self.dropout)
             for kernel, blocks in zip(self.kernels, self.blocks, strict=True)

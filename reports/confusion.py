@@ -1,4 +1,4 @@
-"""The confusion matrix of hide-and-seek: what was hidden against what was named."""
+"""The confusion matrix of the recovery study: what was hidden against what was named."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def first_answer(row: Row) -> str:
 
 
 def matrix(rows: Iterable[Row]) -> dict[str, Counter[str]]:
-    """For each single hidden effect that the oracle sees, how often each answer came first."""
+    """For each single hidden effect that the known-effect reference sees, how often each answer came first."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
         hidden = row["case"]["effects"]
@@ -32,7 +32,7 @@ def matrix(rows: Iterable[Row]) -> dict[str, Counter[str]]:
 
 def summary(rows: Sequence[Row], right: Sequence[bool]) -> list[tuple[str, str]]:
     """The figures that matter, each with its number of cases."""
-    pairs = list(zip(rows, right, strict=True))
+    pairs = [(r, ok) for r, ok in zip(rows, right, strict=True) if r["status"] == "ok"]
     lines = []
 
     def rate(label: str, chosen: list[tuple[Row, bool]]) -> None:
@@ -41,9 +41,9 @@ def summary(rows: Sequence[Row], right: Sequence[bool]) -> list[tuple[str, str]]
             lines.append((label, f"{count} of {len(chosen)} ({100 * count / len(chosen):.1f} %)"))
 
     single = [(r, ok) for r, ok in pairs if r["case"]["effects"] and "," not in r["case"]["effects"]]
-    inside = [(r, ok) for r, ok in single if r["oracle_ratio"] not in (None, float("inf"))]
+    inside = [(r, ok) for r, ok in single if r["reference_ratio"] is not None]
     seen = [(r, ok) for r, ok in inside if r["visible"]]
-    rate("first name right, of the effects that an oracle sees", seen)
+    rate("first name right, of the effects that the known-effect reference sees", seen)
     for key in ("strength", "noise", "rig"):
         for value in sorted({r["case"][key] for r, _ in seen}, key=str):
             rate(f"  {key} {value}", [(r, ok) for r, ok in seen if r["case"][key] == value])
@@ -51,10 +51,12 @@ def summary(rows: Sequence[Row], right: Sequence[bool]) -> list[tuple[str, str]]
     rate("both of two effects named", [(r, ok) for r, ok in both if r["visible"]])
     rate("nothing named where nothing is hidden", [(r, ok) for r, ok in pairs if not r["case"]["effects"]])
     rate("unexplained, where the effect is in no catalogue", [(r, ok) for r, ok in single if (r, ok) not in inside])
-    gains = [r["gain"] / r["oracle_gain"] for r, _ in seen if r["oracle_gain"] > 0]
+    gains = [r["gain"] / r["reference_gain"] for r, _ in seen if r["reference_gain"] > 0]
     if gains:
-        lines.append(("gain recovered, of what the oracle gains (median)", f"{100 * median(gains):.1f} %"))
-    lines.append(("not visible to the oracle, left out", str(len(inside) - len(seen))))
+        lines.append(("gain recovered, of what the reference gains (median)", f"{100 * median(gains):.1f} %"))
+    lines.append(("not visible to the reference, left out", str(len(inside) - len(seen))))
+    if len(pairs) < len(rows):
+        lines.append(("failed, left out", str(len(rows) - len(pairs))))
     return lines
 
 
@@ -79,5 +81,5 @@ def picture(rows: Sequence[Row], file: Path) -> None:
     axes.set_xticks(range(len(answers)), [a.replace("_", " ") for a in answers], rotation=60, ha="right", fontsize=8)
     axes.set_yticks(range(len(hidden)), [f"{h.replace('_', ' ')} ({counts[h].total()})" for h in hidden], fontsize=8)
     axes.set_xlabel("named first")
-    axes.set_ylabel("hidden (cases that the oracle sees)")
+    axes.set_ylabel("hidden (cases that the reference sees)")
     FigureCanvasAgg(figure).print_png(str(file))

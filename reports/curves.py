@@ -45,14 +45,14 @@ class LearningRates:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Rates, losses and what is read from them."""
+        """Write rates, losses and what is read from them."""
         return {
             "model": self.model, "dataset": self.dataset, "rates": self.rates.tolist(), "losses": self.losses.tolist(),
             "steepest": self.steepest, "lowest": self.lowest,
         }  # fmt: skip
 
     def to_html(self) -> str:
-        """The curve as a page."""
+        """Draw the curve as a page."""
         import plotly.graph_objects as go
 
         figure = go.Figure()

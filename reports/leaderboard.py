@@ -51,13 +51,13 @@ def report(folder: str | Path = "results") -> Report:
 
 
 def tables_of(results: list[Result]) -> list[Table]:
-    """The paper's tables and claims if these are results of its suite, the overview, then each data set's table."""
+    """Make the overview and each data set's table, before them the paper's tables and claims for its suite."""
     modes = modes_table(results)
     return [*_of_paper(results), overview(results), *([modes] if modes else []), *_of_datasets(results)]
 
 
 def brief(results: list[Result]) -> list[Table]:
-    """What is shown after a run: the figures of a few data sets in their units, of many the overview."""
+    """Make the tables shown after a run: the figures of a few data sets in their units, of many the overview."""
     details = _of_datasets(results)
     return [*_of_paper(results), *(details if len(details) <= FEW else [overview(results)])]
 

@@ -14,7 +14,7 @@ WINDOWED = " windowed"  # ends the label of a network that sees windows of input
 
 
 def modes_table(results: Sequence[Result]) -> Table | None:
-    """Median fit of the networks in both modes, one row per data set; None where not both were run."""
+    """Compare the median fit of the networks in both modes, one row per data set; None where not both were run."""
     fits = {(s.dataset, s.model): fit.median for s in standings(results) if (fit := s.fit_percent()) is not None}
     networks = sorted({model.removesuffix(WINDOWED) for _, model in fits if model.endswith(WINDOWED)})
     rows = []

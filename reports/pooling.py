@@ -24,7 +24,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value; infinities are values like others."""
+        """Sum up at least one value; infinities are values like others."""
         return cls(statistics.median_low(values), min(values), max(values))
 
 
@@ -37,15 +37,15 @@ class Standing:
     rows: tuple[Result, ...]
 
     def rmse(self, output: str, experiments: Sequence[str]) -> Spread | None:
-        """Free-run RMSE over the experiments, in the output's unit."""
+        """Pool the free-run RMSE over the experiments, in the output's unit."""
         return self._spread(lambda rows: _pooled_rmse(rows, output), "free_run", experiments)
 
     def fit_percent(self) -> Spread | None:
-        """100 (1 - sqrt(mean over the outputs of nrmse^2)) of the free run over all test experiments."""
+        """Compute 100 (1 - sqrt(mean over the outputs of nrmse^2)) of the free run over all test experiments."""
         return self._spread(_pooled_fit, "free_run", ())
 
     def rmse_at(self, output: str, horizon: str) -> Spread | None:
-        """RMSE of the forecast `horizon` samples ahead, over all test experiments."""
+        """Pool the RMSE of the forecast `horizon` samples ahead, over all test experiments."""
 
         def at_horizon(rows: Sequence[Result]) -> float:
             figures = [_figures(row, output) for row in rows]
@@ -55,12 +55,12 @@ class Standing:
         return self._spread(at_horizon, "forecast", ())
 
     def seconds(self) -> float | None:
-        """Median time of a fit."""
+        """Take the median time of a fit."""
         known = [row.fit_seconds for row in self.rows if row.fit_seconds is not None]
         return statistics.median(known) if known else None
 
     def n_params(self) -> int | None:
-        """Largest number of estimated parameters among the seeds."""
+        """Take the largest number of estimated parameters among the seeds."""
         return max((row.n_params for row in self.rows if row.n_params is not None), default=None)
 
     @property
@@ -69,7 +69,7 @@ class Standing:
         return any(row.status in ("error", "timeout") for row in self.rows)
 
     def problems(self) -> list[tuple[str, str]]:
-        """Each status other than ok with its reason, and the warnings of fits that are."""
+        """List each status other than ok with its reason, and the warnings of those that are ok."""
         found = {(row.status, row.message): None for row in self.rows if row.status != "ok" or row.message}
         return list(found)
 
@@ -82,7 +82,7 @@ class Standing:
 
 
 def standings(results: Sequence[Result]) -> list[Standing]:
-    """The results by model and data set. Parameters stand in a model's name where it has several sets."""
+    """Sort results by model and data set. Parameters stand in a model's name where it has several sets."""
     groups: dict[tuple[str, str, str], list[Result]] = {}
     for row in results:
         params = json.dumps(plain(row.params), sort_keys=True)

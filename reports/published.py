@@ -12,7 +12,7 @@ FILE = Path(__file__).parent / "published.toml"
 
 
 def published_tables() -> list[Table]:
-    """One table per source, free-run RMSE as printed there; the notes say what was scored."""
+    """Make one table per source, free-run RMSE as printed there; the notes say what was scored."""
     with FILE.open("rb") as file:
         sources = tomllib.load(file)["source"]
     return [
@@ -27,7 +27,7 @@ def published_tables() -> list[Table]:
 
 
 def published_markdown() -> str:
-    """The section of a report, with a warning on top."""
+    """Write the section of a report, with a warning on top."""
     warning = (
         "Free-run RMSE as printed by others. These models were not run here, and other samples were scored: "
         "compare with care."

@@ -16,9 +16,9 @@ WIDEST_TEXT = 24  # of a column of words on a narrow terminal; a wide one gives 
 
 
 def to_rich(table: Table, width: int = 120) -> rich.console.Group:
-    """The table for a terminal `width` characters wide, the best of a column in bold, the second best underlined,
-    footnotes below.
+    """Draw a table for a terminal `width` characters wide, its footnotes below.
 
+    The best of a column is bold, the second best underlined.
     Words wrap, numbers never: the last columns are left out, and named, where the width does not suffice.
     """
     from rich import box
@@ -42,7 +42,7 @@ def to_rich(table: Table, width: int = 120) -> rich.console.Group:
 
 
 def _width(table: Table, column: int, width: int) -> int:
-    """Characters that a column takes: its longest entry, or the longest word of its heading; words may wrap."""
+    """Count the characters of a column: those of its longest entry or of its heading's longest word; words may wrap."""
     word = max(map(len, table.columns[column].split()), default=0)
     entry = max((len(row[column].text) for row in table.rows), default=0)
     if table.columns[column] in LEFT:
@@ -57,7 +57,7 @@ def _style(cell: Cell) -> str:
 
 
 def to_markdown(table: Table, level: int = 2) -> str:
-    """The table as Markdown under a heading of that level, the best of a column bold, the second best in italics."""
+    """Write a table as Markdown under a heading of that level, the best of a column bold, the second best italic."""
     lines = [f"{'#' * level} {escape(table.title)}", ""]
     lines.append("| " + " | ".join(escape(column) for column in table.columns) + " |")
     lines.append("|" + "".join("---|" if column in LEFT else "--:|" for column in table.columns))
@@ -74,13 +74,13 @@ def _marked(cell: Cell) -> str:
 
 
 def escape(text: str) -> str:
-    """`text` so that Markdown and HTML show it as it is, on one line."""
+    """Escape a text so that Markdown and HTML show it as it is, on one line."""
     text = printable(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return re.sub(r"([\\`*_{}\[\]|#~$!])", r"\\\1", text)
 
 
 def printable(text: str) -> str:
-    """`text` without line breaks and without what a terminal would obey."""
+    """Replace line breaks and what a terminal would obey by blanks."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 

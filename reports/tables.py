@@ -40,7 +40,7 @@ class Table:
 
 
 def tidy(results: Sequence[Result]) -> pd.DataFrame:
-    """One row per result and output, one column per figure; horizons as rmse_1, rmse_2, ... rmse_all."""
+    """Lay out one row per result and output, one column per figure; horizons as rmse_1, rmse_2, ... rmse_all."""
     rows = []
     for result in results:
         about = {
@@ -61,7 +61,7 @@ def tidy(results: Sequence[Result]) -> pd.DataFrame:
 
 
 def overview(results: Sequence[Result]) -> Table:
-    """Fit in percent of the free run: models down, data sets across, the best model first."""
+    """Make a table of the fit in percent of the free run: models down, data sets across, the best model first."""
     found = standings(results)
     datasets = sorted({standing.dataset for standing in found})
     notes = Notes()
@@ -77,7 +77,7 @@ def overview(results: Sequence[Result]) -> Table:
 
 
 def dataset_table(results: Sequence[Result], dataset: str) -> Table:
-    """RMSE, fit, RMSE by horizon, size and time of all models on one data set, the best model first."""
+    """Make a table of RMSE, fit, RMSE by horizon, size and time of all models on one data set, the best first."""
     found = [standing for standing in standings(results) if standing.dataset == dataset]
     rows_of = [row for standing in found for row in standing.rows]
     experiments = list(dict.fromkeys(row.experiment for row in rows_of))
@@ -116,7 +116,7 @@ def dataset_table(results: Sequence[Result], dataset: str) -> Table:
 
 
 def warnings_of(rows: Sequence[Result]) -> list[str]:
-    """What is wrong with rows of one data set in one table."""
+    """Say what is wrong with rows of one data set in one table."""
     if len({row.provenance.get("data_sha256") for row in rows}) > 1:
         return ["These rows come from different versions of the data set; run the suite again."]
     return []
@@ -129,7 +129,7 @@ class Notes:
         self.texts: list[str] = []
 
     def of(self, standing: Standing) -> str:
-        """The marks of all problems of a standing, such as " [1] [2]"."""
+        """Give the marks of all problems of a standing, such as " [1] [2]"."""
         marks = ""
         for status, message in standing.problems():
             text = message if status == "ok" else f"{status}: {message}"
@@ -140,7 +140,7 @@ class Notes:
 
 
 def spread_cell(spread: Spread | None, form: str, failed: bool) -> Cell:
-    """The median, and the range where the seeds differ."""
+    """Write the median, and the range where the seeds differ."""
     if spread is None:
         return Cell("")
     if failed and math.isinf(spread.median):
@@ -167,7 +167,7 @@ def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:
 
 
 def status_of(standing: Standing) -> str:
-    """The status of all rows, or how many have which."""
+    """Write the status of all rows, or how many have which."""
     counts = {status: 0 for status in ("ok", "diverged", "error", "timeout")}
     for row in standing.rows:
         counts[row.status] += 1

@@ -10,7 +10,7 @@ from simgap.records import Experiment
 
 
 def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(u [B, T, nu], y [B, T, ny]) for each length T that occurs; order within a length is kept."""
+    """Stack experiments to (u [B, T, nu], y [B, T, ny]) for each length T that occurs, in the order given."""
     by_length: dict[int, list[Experiment]] = {}
     for experiment in experiments:
         by_length.setdefault(len(experiment), []).append(experiment)

@@ -15,7 +15,7 @@ from simgap.records import UnusableInput
 
 
 def estimate_arx(gram: Gram, orders: Orders, constant: bool = True) -> LinearFit:
-    """One least-squares problem per output, all from one Gram matrix (Ljung 1999, eq. 4.12 and 7.34).
+    """Solve one least-squares problem per output, all from one Gram matrix (Ljung 1999, eq. 4.12 and 7.34).
 
     Raises TooFewSamples when the experiments are too short for the order.
     """
@@ -65,7 +65,7 @@ class TooFewSamples(UnusableInput):
 
 
 def check_length(rows: int, parameters: int, lags: int) -> None:
-    """Raises TooFewSamples when fewer equations than coefficients are left after the first `lags` samples."""
+    """Raise TooFewSamples if `rows` equations, of samples after the first `lags`, are no more than the parameters."""
     if rows <= parameters:
         raise TooFewSamples(
             f"too few samples for the model's order: {parameters} coefficients from {rows} equations "
@@ -74,7 +74,7 @@ def check_length(rows: int, parameters: int, lags: int) -> None:
 
 
 def coefficient_names(regressors: list[tuple[int, int]], ny: int, nu: int) -> tuple[str, ...]:
-    """a1, b0, ... with the channel's number where there are several: a1_2 weighs output 2, one sample ago."""
+    """Name coefficients a1, b0, ..., with the channel where there are several: a1_2 weighs output 2, one sample ago."""
     names = []
     for signal, lag in regressors:
         letter, channel, count = ("a", signal, ny) if signal < ny else ("b", signal - ny, nu)

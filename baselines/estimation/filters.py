@@ -9,11 +9,11 @@ from scipy.signal import lfilter
 
 
 def multiply(b: np.ndarray | Sequence[float], signal: np.ndarray, axis: int = -1) -> np.ndarray:
-    """B(q) x: y(t) = sum_k b_k x(t-k)."""
+    """Compute B(q) x: y(t) = sum_k b_k x(t-k)."""
     # The zero keeps SciPy from convolving row by row in Python, as it does without a denominator.
     return np.asarray(lfilter(b, [1.0, 0.0], signal, axis=axis))
 
 
 def divide(signal: np.ndarray, f: np.ndarray | Sequence[float], axis: int = -1) -> np.ndarray:
-    """x / F(q) with F monic: y(t) = x(t) - sum_k f_k y(t-k)."""
+    """Compute x / F(q) with F monic: y(t) = x(t) - sum_k f_k y(t-k)."""
     return np.asarray(lfilter([1.0], f, signal, axis=axis))

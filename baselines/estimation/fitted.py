@@ -25,19 +25,19 @@ class Row:
     converged: bool = True
 
     @classmethod
-    def at(cls, minimum: Minimum, names: Sequence[str], kept: Sequence[int], samples: int) -> Row:
-        """The coefficients `kept` of a least-squares minimum, with covariance variance * (J' J)^-1."""
+    def at(cls, minimum: Minimum, names: Sequence[str], which: Sequence[int], samples: int) -> Row:
+        """Take the coefficients `which` of a least-squares minimum, with covariance variance * (J' J)^-1."""
         cost, theta = minimum.cost, minimum.theta
         variance = cost.squares / max(samples - len(theta), 1)
         scale = np.sqrt(np.diag(cost.hessian))
         scale[scale == 0] = 1.0
         values, vectors = np.linalg.eigh(cost.hessian / scale / scale[:, None])
-        known = values > len(theta) * 1e-14 * values[-1]  # what is less is rounding of J' J
-        inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / scale / scale[:, None]
-        covariance = (variance * inverse)[np.ix_(kept, kept)]
+        significant = values > len(theta) * 1e-14 * values[-1]  # what is less is rounding of J' J
+        inverse = (vectors[:, significant] / values[significant]) @ vectors[:, significant].T / scale / scale[:, None]
+        covariance = (variance * inverse)[np.ix_(which, which)]
         # A constant that cannot be told from the start state is no reason to doubt the coefficients.
-        rank = len(kept) - max(0, int((~known).sum()) - (len(theta) - len(kept)))
-        return cls(tuple(names), theta[kept], covariance, variance, rank, minimum.converged)
+        rank = len(which) - max(0, int((~significant).sum()) - (len(theta) - len(which)))
+        return cls(tuple(names), theta[which], covariance, variance, rank, minimum.converged)
 
     @property
     def standard_errors(self) -> Float[np.ndarray, " p"]:
@@ -69,18 +69,18 @@ class LinearFit:
         return sum(len(row.values) for row in self.rows)
 
     def criterion(self, penalty: float) -> float:
-        """sum_i N log(V_i) + penalty * p: AIC for penalty 2, BIC for log N (Ljung 1999, section 16.4)."""
+        """Compute sum_i N log(V_i) + penalty * p: AIC for penalty 2, BIC for log N (Ljung 1999, section 16.4)."""
         variances = [row.variance * max(1 - len(row.values) / self.samples, 1e-9) for row in self.rows]
         return float(self.samples * np.sum(np.log(np.maximum(variances, 1e-300)))) + penalty * self.n_params
 
     def complaints(self) -> list[str]:
-        """What a reader must know before trusting the model: why its coefficients or its free run may be useless."""
-        found = []
+        """List why the coefficients or the free run may be useless: what to know before trusting the model."""
+        complaints = []
         if not all(row.converged for row in self.rows):
-            found.append("the search stopped before the error was at its minimum; try a lower order")
+            complaints.append("the search stopped before the error was at its minimum; try a lower order")
         weak = next((row for row in self.rows if row.rank < len(row.values)), None)
         if weak:
-            found.append(
+            complaints.append(
                 f"only {weak.rank} of {len(weak.values)} coefficients can be told apart: the input does not excite the "
                 f"rest, or the order is higher than the data ask for; lower it or use a richer input"
             )
@@ -88,14 +88,14 @@ class LinearFit:
         # Integrators are identified as poles at 1 give or take noise; they grow like t, not exponentially.
         if radius > 1 + 1e-3:
             tenfold = self.polynomial.dt * np.log(10) / np.log(radius)
-            found.append(
+            complaints.append(
                 f"the identified model is unstable: a pole of magnitude {radius:.4g} makes a free run grow tenfold "
                 f"every {tenfold:.3g} s; try another order, simulation error (oe), or data without feedback"
             )
-        return found
+        return complaints
 
     def table(self, outputs: Sequence[str]) -> str:
-        """Every coefficient with its standard error, under the names of the outputs."""
+        """Format every coefficient with its standard error, under the names of the outputs."""
         lines = []
         for output, row in zip(outputs, self.rows, strict=True):
             lines.append(f"{output}: residual standard deviation {np.sqrt(row.variance):.4g}")
@@ -111,7 +111,7 @@ def moved_operating_point(
     shift: Float[np.ndarray, " S"],
     spread: Float[np.ndarray, " S"],
 ) -> tuple[Float[np.ndarray, " ny"], Float[np.ndarray, " nu"]]:
-    """y_mean and u_mean that express A(q) (y - y_0) = B(q) (u - u_0) + constant without the constant.
+    """Find y_mean and u_mean that absorb the constant of A(q) (y - y_0) = B(q) (u - u_0) + constant.
 
     The smallest move from `shift`, in units of `spread`, with A(1) dy - B(1) du = constant; it exists for an
     integrator, too, where A(1) = 0.

@@ -49,15 +49,15 @@ class Gram:
         return np.sqrt(np.where(squares > 0, squares, 1.0))
 
     def chunks(self) -> Iterator[Float[np.ndarray, "S n"]]:
-        """The shifted signals piece by piece, each with the L samples before it; one is gone when the next comes."""
+        """Yield the shifted signals in pieces, each with the L samples before it, in one buffer for all."""
         for experiment in self.experiments:
             yield from _chunks(experiment, self.shift, self.max_lag)
 
 
 def rough_means(experiments: Sequence[Experiment], offset: bool = True) -> Float[np.ndarray, " S"]:
-    """About the mean of each signal, from a thousand samples at most; zero for a model without offset.
+    """Estimate the mean of each signal from a thousand samples at most; zero for a model without offset.
 
-    A rough one will do: it keeps the squares small, and the constant of the model takes up the rest exactly.
+    A rough mean will do: it keeps the squares small, and the constant of the model absorbs what it is off exactly.
     """
     if not offset:
         return np.zeros(experiments[0].y.shape[1] + experiments[0].u.shape[1])
@@ -100,7 +100,9 @@ def _chunks(experiment: Experiment, shift: Float[np.ndarray, " S"], max_lag: int
 def _edges(
     experiment: Experiment, shift: Float[np.ndarray, " S"], max_lag: int
 ) -> tuple[Float[np.ndarray, "S L"], Float[np.ndarray, "S L"]]:
-    """head[i, k] = x_i(L-1-k) enters a sum when its lag grows by one, tail[i, k] = x_i(T-1-k) leaves it."""
+    """Give head[i, k] = x_i(L-1-k), which enters a sum as its lag grows by one, and tail[i, k] = x_i(T-1-k), which
+    leaves it.
+    """
     length = len(experiment)
     head, tail = (
         (np.hstack((experiment.y[part], experiment.u[part])) - shift)[::-1].T
@@ -112,7 +114,7 @@ def _edges(
 def _shift_down(
     first: Float[np.ndarray, "S S L1"], heads: Float[np.ndarray, "E S L"], tails: Float[np.ndarray, "E S L"]
 ) -> Float[np.ndarray, "S L1 S L1"]:
-    """All lags from the products with lag 0, the edges of all experiments together."""
+    """Recur from the products with lag 0 to those of all lags, by the edges of all experiments."""
     count, _, lags = first.shape
     products = np.empty((count, lags, count, lags))
     products[:, 0] = first

@@ -20,7 +20,7 @@ REFINABLE = 1e10
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Solution:
     """theta [p], its covariance [p, p], the constant, the residual variance and the rank of the regressors."""
 
     theta: Float[np.ndarray, " p"]
@@ -40,7 +40,7 @@ class _Columns:
     with_constant: bool
 
 
-def solve(gram: Gram, target: Lagged, regressors: Sequence[Lagged], constant: bool) -> Estimate:
+def solve(gram: Gram, target: Lagged, regressors: Sequence[Lagged], constant: bool) -> Solution:
     """Minimise sum_t (x_target(t) - sum_k theta_k x_k(t - lag_k) - constant)^2 over every experiment.
 
     The normal equations of unit regressors are solved by eigenvalues and, where they are ill conditioned, refined
@@ -62,15 +62,15 @@ def solve(gram: Gram, target: Lagged, regressors: Sequence[Lagged], constant: bo
     inverse = (vectors / values) @ vectors.T
     theta = inverse @ unit[:p, p]
     squares = unit[p, p] - theta @ unit[:p, p]
-    # A small rest of a large total is lost to rounding as well, so that one comes from the data, too.
+    # A small residual of a large total is lost to rounding as well, so that it comes from the data, too.
     if p and (not values[0] * WELL_CONDITIONED > values[-1] or squares < 1e-6):
         theta, squares = _refine(gram, columns, inverse, theta)
     return _in_units(gram, columns, theta, inverse, squares, p)
 
 
 def _refine(gram: Gram, columns: _Columns, inverse: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, float]:
-    """Correct theta by the least-squares solution for what it leaves over, until that is rounding noise."""
-    gradient, squares = _left_over(gram, columns, theta)
+    """Correct theta by the least-squares solution for its residual, until that is rounding noise."""
+    gradient, squares = _residual_products(gram, columns, theta)
     last = np.inf
     for _ in range(8):
         change = inverse @ gradient
@@ -78,28 +78,28 @@ def _refine(gram: Gram, columns: _Columns, inverse: np.ndarray, theta: np.ndarra
         if not size < last:
             break
         theta, last = theta + change, size / 2
-        gradient, squares = _left_over(gram, columns, theta)
+        gradient, squares = _residual_products(gram, columns, theta)
     return theta, squares
 
 
-def _left_over(gram: Gram, columns: _Columns, theta: np.ndarray) -> tuple[np.ndarray, float]:
-    """X^T (y - X theta) and |y - X theta|^2 of unit columns, from the data themselves."""
+def _residual_products(gram: Gram, columns: _Columns, theta: np.ndarray) -> tuple[np.ndarray, float]:
+    """Compute X^T (y - X theta) and |y - X theta|^2 of unit columns from the data themselves."""
     scale = columns.scale
     coefficients = theta * scale[-1] / scale[:-1]
     constant = _constant(gram, columns, coefficients)
-    filters = np.zeros(gram.sums.shape)  # [S, L+1]: what residual(t) takes of each signal at each lag
+    filters = np.zeros(gram.sums.shape)  # [S, L+1]: the weight of each signal at each lag in residual(t)
     np.add.at(filters, (columns.signal, columns.lag), np.append(-coefficients, 1.0))
     products, squares = np.zeros(gram.sums.shape), 0.0
     for signals in gram.chunks():
-        taken = [np.convolve(signal, taps, "valid") for signal, taps in zip(signals, filters, strict=True)]
-        residual = np.sum(taken, axis=0) - constant
+        terms = [np.convolve(signal, taps, "valid") for signal, taps in zip(signals, filters, strict=True)]
+        residual = np.sum(terms, axis=0) - constant
         products += [np.correlate(signal, residual, "valid")[::-1] for signal in signals]
         squares += float(residual @ residual)
     gradient = products[columns.signal[:-1], columns.lag[:-1]]
     return gradient / scale[:-1] / scale[-1], squares / scale[-1] ** 2
 
 
-def _solve_by_qr(gram: Gram, columns: _Columns) -> Estimate:
+def _solve_by_qr(gram: Gram, columns: _Columns) -> Solution:
     """Stack the triangular factor on each piece of the data and factor again: QR in the memory of one piece."""
     p = len(columns.scale) - 1
     triangle: np.ndarray = np.zeros((0, p + 1 + columns.with_constant))
@@ -114,12 +114,12 @@ def _solve_by_qr(gram: Gram, columns: _Columns) -> Estimate:
     rank = int(np.sum(singular > singular[0] * max(gram.rows, p) * np.finfo(float).eps))
     pseudo = (right[:rank].T / singular[:rank]) @ left[:, :rank].T
     theta = pseudo @ triangle[:, p]
-    rest = triangle[:, p] - triangle[:, :p] @ theta
-    return _in_units(gram, columns, theta, pseudo @ pseudo.T, float(rest @ rest), rank)
+    residual = triangle[:, p] - triangle[:, :p] @ theta
+    return _in_units(gram, columns, theta, pseudo @ pseudo.T, float(residual @ residual), rank)
 
 
 def _pieces(gram: Gram, columns: _Columns):
-    """For each piece of the data, the lagged columns as views."""
+    """Yield the lagged columns of each piece of the data as views."""
     for signals in gram.chunks():
         length = signals.shape[1]
         yield [
@@ -134,10 +134,10 @@ def _constant(gram: Gram, columns: _Columns, coefficients: np.ndarray) -> float:
     return float(sums[-1] - coefficients @ sums[:-1]) / max(gram.rows, 1)
 
 
-def _in_units(gram: Gram, columns: _Columns, theta, inverse, squares, rank) -> Estimate:
+def _in_units(gram: Gram, columns: _Columns, theta, inverse, squares, rank) -> Solution:
     scale = columns.scale
     freedom = gram.rows - len(theta) - columns.with_constant
     variance = max(float(squares), 0.0) * scale[-1] ** 2 / max(freedom, 1)
     coefficients = theta * scale[-1] / scale[:-1]
     covariance = variance * inverse / scale[:-1] / scale[:-1, None]
-    return Estimate(coefficients, covariance, _constant(gram, columns, coefficients), variance, rank)
+    return Solution(coefficients, covariance, _constant(gram, columns, coefficients), variance, rank)

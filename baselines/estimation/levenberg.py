@@ -33,7 +33,7 @@ class Equation(Protocol):
         ...
 
     def squares(self, theta: Float[np.ndarray, " p"]) -> float:
-        """|e|^2, which takes a fraction of the time of the slopes."""
+        """|e|^2, which takes a fraction of the time of the Jacobian."""
         ...
 
     def cost(self, theta: Float[np.ndarray, " p"]) -> Cost:
@@ -41,15 +41,15 @@ class Equation(Protocol):
         ...
 
     def allowed(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
-        """The stable points that may stand for a trial point."""
+        """Give the stable points that may stand for a trial point."""
         ...
 
 
 def sum_up(linearised: Iterable[tuple[np.ndarray, np.ndarray]]) -> Cost:
-    """The cost of errors e [..] with slopes de/dtheta [p, ..], group after group."""
+    """Accumulate the cost of errors e [..] and their Jacobians de/dtheta [p, ..] over batches."""
     products = np.zeros((1, 1))  # of [e; de/dtheta] with itself
-    for e, slope in linearised:
-        rows = np.concatenate((e[None], slope)).reshape(len(slope) + 1, -1)
+    for e, jacobian in linearised:
+        rows = np.concatenate((e[None], jacobian)).reshape(len(jacobian) + 1, -1)
         # In pieces that stay in the cache and on one thread.
         for start in range(0, rows.shape[1], PIECE):
             piece = rows[:, start : start + PIECE]
@@ -69,7 +69,7 @@ class Minimum:
 def minimise(equation: Equation, theta: Float[np.ndarray, " p"], max_steps: int = 200) -> Minimum:
     """Minimise |e(theta)|^2 over the stable points.
 
-    Converged is when the gain that the quadratic model promises, g' H^-1 g, is a millionth of the variance: then
+    Converged is when the gain that the quadratic model predicts, g' H^-1 g, is a millionth of the variance: then
     theta is within a thousandth of a standard error, whatever its scale (Ljung 1999, section 10.2; Marquardt 1963).
     """
     tolerance = 1e-6 / equation.samples
@@ -80,10 +80,10 @@ def minimise(equation: Equation, theta: Float[np.ndarray, " p"], max_steps: int 
         scale = np.sqrt(np.diag(cost.hessian))
         scale[scale == 0] = 1.0
         hessian, gradient = cost.hessian / scale / scale[:, None], cost.gradient / scale
-        promised = gradient @ np.linalg.lstsq(hessian, gradient, rcond=1e-14)[0]
-        # The second rule ends a crawl along the edge of the stable region, where the promise is never kept.
+        predicted = gradient @ np.linalg.lstsq(hessian, gradient, rcond=1e-14)[0]
+        # The second rule ends a crawl along the edge of the stable region, where the predicted gain is never reached.
         crawls = len(history) > CRAWL and history[-CRAWL - 1] - squares <= 1e-5 * squares
-        if promised <= tolerance * squares or crawls:
+        if predicted <= tolerance * squares or crawls:
             return Minimum(theta, cost, True)
         while damping < 1e12:
             step = np.linalg.solve(hessian + damping * np.eye(len(theta)), gradient) / scale
@@ -101,10 +101,10 @@ def minimise(equation: Equation, theta: Float[np.ndarray, " p"], max_steps: int 
 
 
 def stable(polynomial: Float[np.ndarray, " n1"], radius: float = 1 - 1e-6) -> list[Float[np.ndarray, " n1"]]:
-    """The monic polynomial in q^-1 itself when all its roots lie inside the circle of `radius`.
+    """Give the monic polynomial in q^-1 itself if all its roots lie inside the circle of `radius`, else two that do.
 
-    Otherwise two that do: roots reflected (1/r for r, which keeps the shape of the spectrum and leads out of a
-    corner), and roots moved onto the circle (which lets a search slide along it).
+    Those have the outer roots reflected (1/r for r, which keeps the shape of the spectrum and leads out of a
+    corner), or moved onto the circle (which lets a search slide along it).
     """
     roots = np.roots(polynomial)
     size = np.maximum(np.abs(roots), 1e-300)

@@ -42,15 +42,15 @@ class LinearModel(ABC):
 
     @abstractmethod
     def given_orders(self, ny: int, nu: int) -> Orders | None:
-        """The orders that the user gave, or None where they are to be selected."""
+        """Give the orders that the user chose, or None where they are to be selected."""
 
     @abstractmethod
     def candidates(self, ny: int, nu: int) -> list[Orders]:
-        """What a selection chooses from."""
+        """List the orders that a selection compares."""
 
     @abstractmethod
     def estimator(self, experiments: Sequence[Experiment], n_init: int, max_lag: int) -> Estimator:
-        """A function from orders to a fit on these experiments, for orders up to max_lag."""
+        """Make a function from orders to a fit on these experiments, for orders up to max_lag."""
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Estimate on train and valid together; a selection by validation compares fits on train alone.
@@ -70,7 +70,7 @@ class LinearModel(ABC):
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """Free run from the state that the first n samples show."""
+        """Run free from the state that the first n samples show."""
         return self.polynomial.simulate(u, y_init)
 
     @property
@@ -89,20 +89,20 @@ class LinearModel(ABC):
         return self.result.orders.as_dict()
 
     def to_control(self) -> control.StateSpace:
-        """The model in python-control, for deviations from its operating point; see `Polynomial.to_control`."""
+        """Convert to python-control, for deviations from its operating point; see `Polynomial.to_control`."""
         return self.polynomial.to_control()
 
     def summary(self) -> str:
-        """Coefficients with standard errors, poles, and the residual analysis."""
+        """Describe the coefficients with standard errors, the poles, and the residual analysis."""
         poles = ", ".join(f"{pole:.4g}" for pole in sorted(self.polynomial.poles, key=abs, reverse=True)[:8])
         outputs = [channel.name for channel in self._data.channels.outputs]
         inputs = [channel.name for channel in self._data.channels.inputs]
-        tests = residual_analysis(self.result, self._data.train + self._data.valid, inputs)
-        lines = [f"{name}: {found.text()}" for name, row in zip(outputs, tests, strict=True) for found in row]
+        correlations = residual_analysis(self.result, self._data.train + self._data.valid, inputs)
+        lines = [f"{name}: {one.text()}" for name, row in zip(outputs, correlations, strict=True) for one in row]
         return "\n".join((self.result.table(outputs), f"poles of the simulation: {poles}", *lines))
 
     def _selected(self, data: TrainingSet, candidates: list[Orders]) -> tuple[Orders, LinearFit]:
-        """The chosen candidate and its fit, at which the final estimation begins.
+        """Choose a candidate; its fit is where the final estimation begins.
 
         So the model that is refined is the one that was chosen, and no other minimum of the same order.
         """
@@ -136,7 +136,7 @@ class LinearModel(ABC):
 
 
 def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_init: int) -> LinearFit:
-    """The fit with the fewest coefficients whose free run is no worse than the best by more than chance.
+    """Choose the fit with the fewest coefficients whose free run is no worse than the best by more than chance.
 
     Chance is one standard error of the difference over pieces of the validation data (Breiman, Friedman, Olshen and
     Stone 1984, section 3.4.3, on paired differences).
@@ -157,7 +157,7 @@ def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_i
 def free_run_errors(
     model: Polynomial, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
 ) -> Float[np.ndarray, " K"]:
-    """Mean over the outputs of mse / variance, in `pieces` pieces or more of all experiments; inf if it diverges."""
+    """Average mse / variance over the outputs, in `pieces` pieces or more of all experiments; inf if it diverges."""
     spread = np.concatenate([e.y[n_init:] for e in experiments]).var(axis=0)
     spread[spread == 0] = 1.0
     each = -(-pieces // len(experiments))
@@ -171,7 +171,7 @@ def free_run_errors(
 
 
 def check_together(model: str, **orders: Any) -> None:
-    """Raises UnusableInput when some of these orders were given and others not."""
+    """Raise UnusableInput when some of these orders were given and others not."""
     given = [name for name, value in orders.items() if value is not None]
     if given and len(given) < len(orders):
         raise UnusableInput(f"{model}: {', '.join(orders)} belong together; only {', '.join(given)} given")

@@ -54,7 +54,7 @@ class Orders:
         return int(max(self.max_lag, self.nc.max()))
 
     def lagged(self, row: int) -> list[tuple[int, int]]:
-        """(signal, lag) of every regressor of output `row`; outputs are signals 0..ny-1, inputs follow."""
+        """List (signal, lag) of every regressor of output `row`; outputs are signals 0..ny-1, inputs follow."""
         ny = len(self.na)
         past = [(j, k) for j in range(ny) for k in range(1, self.na[row, j] + 1)]
         for j in range(self.nb.shape[1]):
@@ -62,7 +62,7 @@ class Orders:
         return past
 
     def as_dict(self) -> dict[str, object]:
-        """Plain numbers where all channels agree, for tables and results."""
+        """Give plain numbers where all channels agree, for tables and results."""
         named = {"na": self.na, "nb": self.nb, "nc": self.nc, "nf": self.nf, "nk": self.nk}
         return {
             name: int(value.flat[0]) if np.all(value == value.flat[0]) else value.tolist()
@@ -72,9 +72,9 @@ class Orders:
 
 
 def _spread(name: str, value: Order, shape: tuple[int, ...]) -> np.ndarray:
-    given = np.asarray(value)
-    if given.dtype.kind not in "iu" or (given.size and given.min() < 0):
+    orders = np.asarray(value)
+    if orders.dtype.kind not in "iu" or (orders.size and orders.min() < 0):
         raise UnusableInput(f"{name} = {value} is not an order; give whole numbers from 0")
-    if given.ndim and given.shape != shape:
-        raise UnusableInput(f"{name} has shape {given.shape}; give one number, or a matrix of shape {shape}")
-    return np.broadcast_to(given, shape).astype(int)
+    if orders.ndim and orders.shape != shape:
+        raise UnusableInput(f"{name} has shape {orders.shape}; give one number, or a matrix of shape {shape}")
+    return np.broadcast_to(orders, shape).astype(int)

@@ -1,64 +1,24 @@
-"""Output error: y = B(q)/F(q) u + e by minimising the error of the simulation itself."""
+"""The simulation error of y = B(q)/F(q) u + e, its sum of squares and its Jacobian."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.filters import divide, multiply
-from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
+from simgap.baselines.estimation.fitted import Row
+from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
-from simgap.baselines.estimation.polynomial import Polynomial
-from simgap.baselines.estimation.starts import oe_starts
-from simgap.records import Experiment, UnusableInput
-
-
-def estimate_oe(
-    experiments: Sequence[Experiment],
-    shift: Float[np.ndarray, " S"],
-    orders: Orders,
-    constant: bool = True,
-    n_start: int | None = None,
-    start: LinearFit | None = None,
-) -> LinearFit:
-    """Minimise the squared simulation error, one output at a time, F kept stable (Ljung 1999, section 10.2).
-
-    With n_start, each simulation starts from the state that the first n_start samples show, and only what follows
-    counts: the error that is minimised is the free run that will be scored. Without it the start states are free
-    parameters: efficient under white noise, but slow modes then absorb whatever the model lacks.
-    The search begins at `start`, an earlier fit, and around its operating point, or else at the two best of several
-    linear estimates. Raises TooFewSamples when the experiments are too short for the order.
-    """
-    shift = start.operating_point if start else shift
-    ny = len(orders.nb)
-    rows, transfers, constants, samples = [], [], np.zeros(ny), 0
-    for i in range(ny):
-        equation = OutputError.of(experiments, shift, orders, i, constant, n_start)
-        samples = equation.samples
-        check_length(samples, equation.n_params, equation.n_start or 0)
-        if start:
-            begin = [equation.theta_of(start.rows[i])]
-        else:
-            candidates = oe_starts(experiments, shift, orders, i, equation)
-            begin = sorted(candidates, key=equation.squares)[:2]
-        searches = [minimise(equation, theta) for theta in begin]
-        best = min(searches, key=lambda search: search.cost.squares)
-        names = equation.names
-        rows.append(Row.at(best, names, range(len(names)), samples))
-        transfers.append(equation.transfer(best.theta))
-        constants[i] = best.theta[-1] if constant else 0.0
-    return _assemble(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
+from simgap.records import UnusableInput
 
 
 @dataclass(frozen=True, eq=False)
 class OutputError:
-    """One output, y = sum_j B_j/F_j u_j + constant + R z + e, for each group of experiments of one length.
+    """One output, y = sum_j B_j/F_j u_j + constant + R z + e, for each batch of experiments of one length.
 
     theta holds, for each input with nb > 0, the nf coefficients of F_j, then the nb of B_j; the constant is last.
     R [T, N] are the free responses of 1/(F_1 F_2 ..), all that the plant's past can cause; z is eliminated at every
@@ -82,12 +42,12 @@ class OutputError:
             raise UnusableInput(f"no input acts on output {output + 1}; give it nb of at least 1")
         if n_start is not None:  # fewer samples than the state would leave it undetermined
             n_start = max(n_start, empty.state + 1)
-        groups = [
+        batches = [
             (u - shift[ny:], y[:, :, output] - shift[output])
             for u, y in stack(experiments)
             if u.shape[1] > (n_start or empty.state)
         ]
-        return replace(empty, u=[u for u, _ in groups], y=[y for _, y in groups], n_start=n_start)
+        return replace(empty, u=[u for u, _ in batches], y=[y for _, y in batches], n_start=n_start)
 
     @property
     def samples(self) -> int:
@@ -115,7 +75,7 @@ class OutputError:
         return names
 
     def theta_of(self, row: Row) -> np.ndarray:
-        """The same coefficients, with no constant."""
+        """Give theta of an estimated equation, with no constant."""
         return np.concatenate((row.values, np.zeros(int(self.constant))))
 
     @property
@@ -125,7 +85,7 @@ class OutputError:
         return max(max(poles, poles - self.nf[j] + self.nb[j] + self.nk[j] - 1) for j in self.used)
 
     def split(self, theta: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, slice]]:
-        """(input, B with its delay, monic F, where the pair stands in theta)."""
+        """Yield (input, B with its delay, monic F, where the pair stands in theta)."""
         at = 0
         for j in self.used:
             middle, end = at + self.nf[j], at + self.nf[j] + self.nb[j]
@@ -134,7 +94,7 @@ class OutputError:
             at = end
 
     def transfer(self, theta: np.ndarray) -> tuple[np.ndarray, dict[int, np.ndarray]]:
-        """The same over one denominator: F_1 F_2 .., and B_j times the F of the other inputs."""
+        """Give the common denominator F_1 F_2 .. and, of each input, B_j times the F of the others."""
         parts = list(self.split(theta))
         common, numerators = np.ones(1), {}
         for j, b, f, _ in parts:
@@ -146,7 +106,7 @@ class OutputError:
         return common, numerators
 
     def allowed(self, theta: np.ndarray) -> list[np.ndarray]:
-        """Points whose poles are stable or integrate, so that a simulation cannot run away."""
+        """Give points whose poles are stable or integrate, so that a simulation cannot run away."""
         candidates = [theta.copy(), theta.copy()]
         for j, _, f, part in self.split(theta):
             repaired = stable(f, radius=1.0)
@@ -155,29 +115,29 @@ class OutputError:
         return candidates if (candidates[0] != candidates[1]).any() else candidates[:1]
 
     def squares(self, theta: np.ndarray) -> float:
-        """|e|^2."""
+        """Compute |e|^2."""
         return sum(float(np.vdot(run.counted, run.counted)) for run in self._runs(theta))
 
     def cost(self, theta: np.ndarray) -> Cost:
-        """|e|^2, half its gradient and J' J."""
+        """Compute |e|^2, half its gradient and J' J."""
         return sum_up(self.linearised(theta))
 
     def linearised(self, theta: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """e [B, T-n] and de/dtheta [p, B, T-n] of each group (n = 0 without n_start).
+        """Yield e [B, T-n] and de/dtheta [p, B, T-n] of each batch (n = 0 without n_start).
 
         de/db_k = -q^-k u/F and de/df_k = q^-k (B/F) u/F (Ljung 1999, eq. 10.50). The start is eliminated by variable
         projection: e = P r with P = 1 - R pinv(R_n) over the first n samples (Golub and Pereyra 1973).
         """
         for run in self._runs(theta):
-            n, slope = run.inverse.shape[1], self._slope(theta, run)
-            slope -= slope[:, :, :n] @ run.inverse.T @ run.free.T
+            n, jacobian = run.inverse.shape[1], self._jacobian(theta, run)
+            jacobian -= jacobian[:, :, :n] @ run.inverse.T @ run.free.T
             if n < run.e.shape[1]:
-                self._add_change_of_fit(slope, theta, run)
-                slope = slope[:, :, n:]
-            yield run.counted, slope
+                self._add_change_of_fit(jacobian, theta, run)
+                jacobian = jacobian[:, :, n:]
+            yield run.counted, jacobian
 
     def _runs(self, theta: np.ndarray) -> Iterator[_Run]:
-        """The simulation of each group, from the start that suits it best."""
+        """Simulate each batch from the start state that fits it best."""
         for u, y in zip(self.u, self.y, strict=True):
             filtered = {j: divide(u[:, :, j], f) for j, _, f, _ in self.split(theta)}
             responses = {j: multiply(b, filtered[j]) for j, b, _, _ in self.split(theta)}
@@ -187,40 +147,40 @@ class OutputError:
             yield _Run(filtered, responses, free, inverse, start, residual - start)
 
     def _free_responses(self, theta: np.ndarray, length: int) -> tuple[np.ndarray, np.ndarray]:
-        """R [T, N], and the pseudo-inverse [N, n] of its first n_start rows."""
+        """Compute R [T, N] and the pseudo-inverse [N, n] of its first n_start rows."""
         common, _ = self.transfer(theta)
         free = divide(np.eye(self.state, length), common).T
         return free, np.linalg.pinv(free[: self.n_start], rcond=1e-10)
 
-    def _slope(self, theta: np.ndarray, run: _Run) -> np.ndarray:
-        """de/dtheta [p, B, T] at a fixed z, whose response rings through every F as the others do."""
-        slope = np.zeros((self.n_params, *run.e.shape))
+    def _jacobian(self, theta: np.ndarray, run: _Run) -> np.ndarray:
+        """Compute de/dtheta [p, B, T] at a fixed z, whose response rings through every F as the others do."""
+        jacobian = np.zeros((self.n_params, *run.e.shape))
         length = run.e.shape[1]
         for j, _, f, part in self.split(theta):
             twice = divide(run.responses[j] + run.start, f)
             for k in range(1, self.nf[j] + 1):
-                slope[part.start + k - 1, :, k:] = twice[:, : length - k]
+                jacobian[part.start + k - 1, :, k:] = twice[:, : length - k]
             for k in range(self.nb[j]):
                 lag = self.nk[j] + k
-                slope[part.start + self.nf[j] + k, :, lag:] = -run.filtered[j][:, : length - lag]
+                jacobian[part.start + self.nf[j] + k, :, lag:] = -run.filtered[j][:, : length - lag]
         if self.constant:
-            slope[-1] = -1.0
-        return slope
+            jacobian[-1] = -1.0
+        return jacobian
 
-    def _add_change_of_fit(self, slope: np.ndarray, theta: np.ndarray, run: _Run) -> None:
-        """The part of dz/df that the misfit of the first n samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
+    def _add_change_of_fit(self, jacobian: np.ndarray, theta: np.ndarray, run: _Run) -> None:
+        """Add the part of dz/df that the misfit of the first n samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
         n = run.inverse.shape[1]
         misfit = run.e[:, :n]
         spread = run.free @ (run.inverse @ run.inverse.T)  # [T, N]
         for j, _, f, part in self.split(theta):
             change = divide(run.free[:n], f, axis=0)
             for k in range(1, self.nf[j] + 1):
-                slope[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
+                jacobian[part.start + k - 1] += misfit[:, k:] @ change[: n - k] @ spread.T
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """The simulation of one group, and what its slopes need of it."""
+    """The simulation of one batch, and what its Jacobian needs of it."""
 
     filtered: dict[int, Float[np.ndarray, "B T"]]  # u/F of each input
     responses: dict[int, Float[np.ndarray, "B T"]]  # B/F u
@@ -234,25 +194,3 @@ class _Run:
         """e without the samples that the start was found from, unless those are all."""
         n = self.inverse.shape[1]
         return self.e[:, n:] if n < self.e.shape[1] else self.e
-
-
-def _assemble(
-    dt: float,
-    shift: np.ndarray,
-    orders: Orders,
-    rows: tuple[Row, ...],
-    transfers: list,
-    constants: np.ndarray,
-    samples: int,
-) -> LinearFit:
-    """One polynomial model: A is diagonal with the common denominators, and C = A."""
-    ny, nu = orders.nb.shape
-    order = max(max(len(f), *map(len, numerators.values())) for f, numerators in transfers) - 1
-    a, b = np.zeros((order + 1, ny, ny)), np.zeros((order + 1, ny, nu))
-    for i, (f, numerators) in enumerate(transfers):
-        a[: len(f), i, i] = f
-        for j, numerator in numerators.items():
-            b[: len(numerator), i, j] = numerator
-    # The constant was added to the output, so it is part of the operating point already.
-    polynomial = Polynomial(a, b, a, shift[ny:], shift[:ny] + constants, dt)
-    return LinearFit(polynomial, orders, rows, constants, samples)

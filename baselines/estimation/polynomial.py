@@ -24,7 +24,7 @@ class Polynomial:
 
         y_hat = z_0 + B_0 u,   z_k <- z_{k+1} + B_{k+1} u - A_{k+1} y_hat + (C_{k+1} - A_{k+1}) (y - y_hat),
 
-    in which a simulation is the prediction that is told y = y_hat (Ljung 1999, section 4.3).
+    in which a simulation is the prediction with y = y_hat (Ljung 1999, section 4.3).
     """
 
     a: Float[np.ndarray, "N1 ny ny"]
@@ -42,7 +42,7 @@ class Polynomial:
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """Free run from the state that the first n samples show; no measured output is used after them."""
+        """Run free from the state that the first n samples show; no measured output is used after them."""
         n = y_init.shape[1]
         u = u - self.u_mean
         state = self._state_after(u[:, :n], y_init - self.y_mean)
@@ -51,7 +51,7 @@ class Polynomial:
         return y
 
     def predict(self, u: Float[np.ndarray, "B T nu"], y: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T ny"]:
-        """One-step predictions y_hat(t | t-1) from measured outputs; the start state fits the whole record."""
+        """Predict y_hat(t | t-1) from measured outputs; the start state fits the whole record."""
         u, y = u - self.u_mean, y - self.y_mean
         return self._follow(u, y, self._start_state(u, y)) + self.y_mean
 
@@ -70,7 +70,7 @@ class Polynomial:
         return np.linalg.eigvals(self.state_space[0])
 
     def to_control(self) -> control.StateSpace:
-        """The same model in python-control, for deviations from the operating point.
+        """Convert to python-control, for deviations from the operating point.
 
         forced_response(to_control(), U=(u - u_mean).T) + y_mean equals a free run that starts at rest.
         """
@@ -87,9 +87,9 @@ class Polynomial:
         return _run(self.c, self._predictor, np.concatenate((u, y), axis=2), start)
 
     def _start_state(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """z [B, N, ny] at t = 0 by least squares on the one-step prediction errors of the record.
+        """Estimate z [B, N, ny] at t = 0 by least squares on the one-step prediction errors of the record.
 
-        What the record is too short to tell is taken from a machine that had stood at its first sample for long.
+        What the record is too short to tell is taken from a plant that had stood at its first sample for long.
         """
         batch, n, ny = y.shape
         rest = np.concatenate((self.b, -self.a), axis=2)[:0:-1].cumsum(axis=0)[::-1]  # [N, ny, nu+ny]
@@ -101,14 +101,14 @@ class Polynomial:
         return start + (error @ effect.T).reshape(batch, self.order, ny)
 
     def _free_response(self, n: int) -> np.ndarray:
-        """[n*ny, N*ny]: what each element of z adds to the next n predictions."""
+        """Compute what each element of z adds to the next n predictions, [n*ny, N*ny]."""
         ny, size = len(self.y_mean), self.order * len(self.y_mean)
         unit = np.eye(size).reshape(size, self.order, ny)
         nothing = np.zeros((size, n, self._predictor.shape[2]))
         return _run(self.c, self._predictor[:1], nothing, unit).reshape(size, n * ny).T
 
     def _state_after(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """z [B, N, ny] at t = n, after the predictor has followed the n measured samples."""
+        """Compute z [B, N, ny] at t = n, after the predictor has followed the n measured samples."""
         n, start = y.shape[1], self._start_state(u, y)
         signals = np.concatenate((u, y, self._follow(u, y, start)), axis=2)
         weights = np.concatenate((self._predictor, -self.c), axis=2)
@@ -123,5 +123,5 @@ class Polynomial:
 
 
 def _run(a: np.ndarray, b: np.ndarray, u: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A(q) y = B(q) u from the state z, for arrays in any memory order."""
+    """Solve A(q) y = B(q) u from the state z, for arrays in any memory order."""
     return filter_matrix(*(np.ascontiguousarray(part) for part in (a[1:], b, u, z)))

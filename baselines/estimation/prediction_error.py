@@ -1,56 +1,24 @@
-"""ARMAX: A(q) y = B(q) u + C(q) e by minimising the one-step prediction error."""
+"""The one-step prediction error of A(q) y = B(q) u + C(q) e, its sum of squares and its Jacobian."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
-from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names
 from simgap.baselines.estimation.filters import divide, multiply
-from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.gram import Gram, lagged_gram
-from simgap.baselines.estimation.levenberg import Cost, minimise, stable, sum_up
+from simgap.baselines.estimation.fitted import Row
+from simgap.baselines.estimation.gram import Gram
+from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
-from simgap.baselines.estimation.starts import armax_starts
-from simgap.records import Experiment
-
-
-def estimate_armax(
-    experiments: Sequence[Experiment],
-    shift: Float[np.ndarray, " S"],
-    orders: Orders,
-    constant: bool = True,
-    start: LinearFit | None = None,
-) -> LinearFit:
-    """Minimise sum e^2 of C(q) e = A(q) y - B(q) u, one output at a time, C kept stable.
-
-    The search begins at `start`, an earlier fit, and around its operating point, or else at two linear estimates.
-    Ljung 1999, sections 7.2 and 10.2. Raises TooFewSamples when the experiments are too short for the order.
-    """
-    gram = lagged_gram(experiments, start.operating_point if start else shift, orders.max_lag)
-    ny = len(orders.na)
-    rows, constants, noise = [], np.zeros(ny), []
-    for i in range(ny):
-        check_length(gram.rows, len(orders.lagged(i)) + int(orders.nc[i]) + constant, gram.max_lag)
-        equation = PredictionError.of(gram, orders, i, constant)
-        begin = [equation.theta_of(start.rows[i])] if start else armax_starts(gram, orders, i, equation)
-        searches = [minimise(equation, theta) for theta in begin]
-        best = min(searches, key=lambda search: search.cost.squares)
-        names = coefficient_names(orders.lagged(i), *orders.nb.shape)
-        names += tuple(f"c{k}" for k in range(1, equation.nc + 1))
-        rows.append(Row.at(best, names, equation.coefficients, equation.samples))
-        constants[i] = best.theta[equation.linear - 1] if constant else 0.0
-        noise.append(equation.noise(best.theta))
-    return assemble(gram, orders, tuple(rows), constants, noise)
 
 
 @dataclass(frozen=True, eq=False)
 class PredictionError:
-    """One output, y = Phi theta + C e, for each group of experiments of one length.
+    """One output, y = Phi theta + C e, for each batch of experiments of one length.
 
     Only samples whose regressors are all measured are predicted. The nc samples of e before them are estimated
     along and count in the sum of squares (Box and Jenkins 1976, section 7.1, unconditional least squares): taken as
@@ -87,11 +55,11 @@ class PredictionError:
     @property
     def coefficients(self) -> list[int]:
         """Where theta holds coefficients of A, B and C: everywhere but at the constant, which ends the linear part."""
-        kept = self.linear - self.constant
-        return [*range(kept), *range(self.linear, self.linear + self.nc)]
+        first_part = self.linear - self.constant
+        return [*range(first_part), *range(self.linear, self.linear + self.nc)]
 
     def theta_of(self, row: Row) -> np.ndarray:
-        """The same coefficients, with no constant."""
+        """Give theta of an estimated equation, with no constant."""
         theta = np.zeros(self.linear + self.nc)
         theta[self.coefficients] = row.values
         return theta
@@ -109,35 +77,36 @@ class PredictionError:
         return [np.concatenate((theta[: self.linear], c[1:])) for c in stable(self.noise(theta))]
 
     def errors(self, theta: np.ndarray) -> list[np.ndarray]:
-        """[B, nc + T]: the nc samples of e before the record that make the sum of squares smallest, then e."""
+        """Compute [B, nc + T]: the nc samples of e before the record that make the sum of squares smallest, then e."""
         residuals = (y - np.tensordot(theta[: self.linear], phi, 1) for phi, y in zip(self.phi, self.y, strict=True))
         return [self._without_start(self._filtered(residual, theta), theta) for residual in residuals]
 
     def past(self, e: np.ndarray) -> np.ndarray:
-        """[nc, B, T]: e one to nc samples ago."""
+        """Stack e one to nc samples ago, [nc, B, T]."""
         batch, length = e.shape[0], e.shape[1] - self.nc
         lagged = [e[:, self.nc - k : self.nc - k + length] for k in range(1, self.nc + 1)]
         return np.array(lagged).reshape(self.nc, batch, length)
 
     def squares(self, theta: np.ndarray) -> float:
-        """|e|^2."""
+        """Compute |e|^2."""
         return sum(float(np.vdot(e, e)) for e in self.errors(theta))
 
     def cost(self, theta: np.ndarray) -> Cost:
-        """|e|^2, half its gradient and J' J."""
+        """Compute |e|^2, half its gradient and J' J."""
         return sum_up(self.linearised(theta))
 
     def linearised(self, theta: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """e [B, nc + T] and de/dtheta [p, B, nc + T] of each group: -Phi / C and -q^-k e / C (Ljung 1999, eq. 10.53).
+        """Yield e [B, nc + T] and de/dtheta [p, B, nc + T] of each batch.
 
-        The start is eliminated at every point: variable projection with Kaufman's Jacobian (1975).
+        The Jacobian is -Phi / C and -q^-k e / C (Ljung 1999, eq. 10.53). The start is eliminated at every point:
+        variable projection with Kaufman's Jacobian (1975).
         """
         for phi, e in zip(self.phi, self.errors(theta), strict=True):
-            slope = -self._filtered(np.concatenate((phi, self.past(e))), theta)
-            yield e, self._without_start(slope, theta)
+            jacobian = -self._filtered(np.concatenate((phi, self.past(e))), theta)
+            yield e, self._without_start(jacobian, theta)
 
     def pseudo_linear(self, errors: list[np.ndarray]) -> np.ndarray:
-        """theta by least squares on Phi and on past errors that are taken as known."""
+        """Estimate theta by least squares on Phi and on past errors that are taken as known."""
         columns = (np.concatenate((phi, self.past(e))) for phi, e in zip(self.phi, errors, strict=True))
         products = sum_up(zip(self.y, columns, strict=True))
         return self.allowed(np.linalg.lstsq(products.hessian, products.gradient, rcond=1e-14)[0])[0]
@@ -148,22 +117,22 @@ class PredictionError:
         return np.concatenate((before, divide(signals, self.noise(theta))), axis=-1)
 
     def _without_start(self, signals: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Project signals [..., nc + T] off what e before the record adds: itself, and its echo through 1/C."""
+        """Project signals [..., nc + T] off what e before the record adds: itself, and its response through 1/C."""
         if self.nc == 0:
             return signals
         c = self.noise(theta)
-        heard = signals[..., : self.nc + _ringing(c, signals.shape[-1] - self.nc)]
-        impulse = np.eye(1, heard.shape[-1] - self.nc)[0]
-        start = np.eye(self.nc, heard.shape[-1])
+        echo = signals[..., : self.nc + _ringing(c, signals.shape[-1] - self.nc)]
+        impulse = np.eye(1, echo.shape[-1] - self.nc)[0]
+        start = np.eye(self.nc, echo.shape[-1])
         for k in range(self.nc):  # row k is a unit e, nc - k samples before the record
             start[k, self.nc :] = divide(multiply(-c[self.nc - k :], impulse), c)
         basis = np.linalg.qr(start.T)[0]  # [n, nc]
-        heard -= (heard @ basis) @ basis.T
+        echo -= (echo @ basis) @ basis.T
         return signals
 
 
 def _ringing(c: np.ndarray, length: int) -> int:
-    """After how many samples the echo of 1/C is lost in rounding: r^n < 1e-17 for its largest root r, and some more."""
+    """Count the samples until 1/C has rung out to rounding: r^n < 1e-17 for its largest root r, and some more."""
     radius = np.abs(np.roots(c)).max(initial=0.0)
     if radius > 0.999:
         return length

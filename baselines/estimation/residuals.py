@@ -37,26 +37,26 @@ class Correlation:
         return self.lags[np.abs(self.values) > self.bounds]
 
     def text(self) -> str:
-        """How many lags are outside, which, and how many chance would put there."""
+        """Say how many lags are outside, which, and how many chance would put there."""
         expected = 0.05 * len(self.lags)
-        found = ", ".join(map(str, self.outside[:8])) + (", .." if len(self.outside) > 8 else "")
+        lags = ", ".join(map(str, self.outside[:8])) + (", .." if len(self.outside) > 8 else "")
         return (
             f"residual with {self.signal}: {len(self.outside)} of {len(self.lags)} lags outside the 95 % bounds "
-            f"({expected:.1f} by chance)" + (f": {found}" if found else "")
+            f"({expected:.1f} by chance)" + (f": {lags}" if lags else "")
         )
 
 
 def residual_analysis(
     fit: LinearFit, experiments: Sequence[Experiment], inputs: Sequence[str], max_lag: int = 25
 ) -> list[list[Correlation]]:
-    """For each output: the residual with its own past, lags 1..L, then with each input, lags -L..L.
+    """Correlate, for each output, the residual with its own past, lags 1..L, then with each input, lags -L..L.
 
     `inputs` are their names, for the texts. A correlation at negative lags means feedback. The bounds are 1.96
     standard deviations if the model is right, less what the estimated parameters take away (Box and Pierce 1970),
 
         r(tau) = z' e / (|z| |e|),   var z' e = z' M R_e M z,   M = 1 - psi (psi' psi)^-1 psi',
 
-    for z(t) = u(t - tau) or e(t - tau) and psi the slopes of the errors (Ljung 1999, section 16.6). The plain 1/N is
+    for z(t) = u(t - tau) or e(t - tau) and psi the Jacobian of the errors (Ljung 1999, section 16.6). The plain 1/N is
     too wide at small lags, and wrong where residual and input are both coloured. Short records are asked for fewer
     lags; where even one lag is too many, an output has no findings.
     """
@@ -73,14 +73,14 @@ def _of_output(
         return []
     own = range(1, max_lag + 1)
     both = range(-max_lag, max_lag + 1)
-    found = [_correlate("its own past", pieces, own, lambda e, u: e, white=True)]
+    correlations = [_correlate("its own past", pieces, own, lambda e, u: e, white=True)]
     for j, name in enumerate(inputs):
-        found.append(_correlate(name, pieces, both, lambda e, u, j=j: u[:, j], white=False))
-    return found
+        correlations.append(_correlate(name, pieces, both, lambda e, u, j=j: u[:, j], white=False))
+    return correlations
 
 
 def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int) -> Iterator[tuple]:
-    """e [T], slopes [p, T] and u [T, nu] of each experiment, over the same samples, until there are enough."""
+    """Yield e [T], Jacobian [p, T] and u [T, nu] of each experiment, over the same samples, until there are enough."""
     model, before = fit.polynomial, int(fit.orders.nc[output])
     shift = np.concatenate((model.y_mean, model.u_mean))
     if fit.orders.nf.any():
@@ -89,26 +89,26 @@ def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int) -> 
         equation = PredictionError.of(lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True)
     theta = equation.theta_of(fit.rows[output])
     seen = 0
-    for (e, slope), u in zip(equation.linearised(theta), equation.u, strict=True):
+    for (e, jacobian), u in zip(equation.linearised(theta), equation.u, strict=True):
         for s in range(len(e)):
             if seen >= ENOUGH_SAMPLES:
                 return
-            kept = slice(before, before + ENOUGH_SAMPLES)
+            counted = slice(before, before + ENOUGH_SAMPLES)
             seen += e.shape[1] - before
-            yield e[s, kept], slope[:, s, kept], u[s, :ENOUGH_SAMPLES]
+            yield e[s, counted], jacobian[:, s, counted], u[s, :ENOUGH_SAMPLES]
 
 
 def _correlate(name: str, pieces: list, lags: range, signal_of, white: bool) -> Correlation:
-    """Each piece keeps the samples for which every lag exists; pieces are summed, never glued."""
+    """Correlate over the samples of each piece for which every lag exists; pieces are summed, never glued."""
     first, last = max(lags[-1], 0), max(-lags[0], 0)
-    errors, slopes, lagged = [], [], []
-    for e, slope, u in pieces:
+    errors, jacobians, lagged = [], [], []
+    for e, jacobian, u in pieces:
         end = len(e) - last
         z = signal_of(e, u)
         errors.append(e[first:end])
-        slopes.append(slope[:, first:end])
+        jacobians.append(jacobian[:, first:end])
         lagged.append(np.stack([z[first - lag : end - lag] for lag in lags]))  # [L, n]
-    e, psi, z = (np.concatenate(parts, axis=-1) for parts in (errors, slopes, lagged))
+    e, psi, z = (np.concatenate(parts, axis=-1) for parts in (errors, jacobians, lagged))
     own = z - np.linalg.lstsq(psi.T, z.T, rcond=None)[0].T @ psi  # M z
     norms = np.linalg.norm(z, axis=1) * np.linalg.norm(e)
     norms[norms == 0] = 1.0
@@ -123,7 +123,7 @@ def _correlate(name: str, pieces: list, lags: range, signal_of, white: bool) -> 
 
 
 def _coloured_variance(errors: list[np.ndarray], own: list[np.ndarray], order: int = 5) -> np.ndarray:
-    """Variance of z' e for e = w / D(q), an autoregression fitted to the residual: var w * |z filtered backwards|^2."""
+    """Compute var z' e for e = w / D(q), an autoregression fitted to the residual: var w * |z filtered backwards|^2."""
     products = [sum(float(e[k:] @ e[: len(e) - k]) for e in errors) for k in range(order + 1)]
     total = sum(map(len, errors))
     if products[0] == 0:

@@ -21,19 +21,17 @@ def try_model(
     check_writable(json)
     candidate = contract.candidate(model, parse_params(param or ()))
     start = time.perf_counter()
-    verdicts = []
-    for verdict in contract.examine(candidate):
-        verdicts.append(verdict)
-        said = f"WRONG  {verdict.check}: {verdict.wrong}" if verdict.wrong else f"ok     {verdict.check}"
+    results = []
+    for result in contract.examine(candidate):
+        results.append(result)
+        said = f"WRONG  {result.check}: {result.wrong}" if result.wrong else f"ok     {result.check}"
         typer.echo(" ".join(said.split("\n")))
-    wrong = sum(bool(verdict.wrong) for verdict in verdicts)
+    wrong = sum(bool(result.wrong) for result in results)
     if not wrong:
         error, held = contract.toy_errors(candidate)
         typer.echo(f"free run on a toy plant: RMSE {error**0.5:.3g}, that of holding the last value {held**0.5:.3g}")
-    typer.echo(
-        f"{len(verdicts) - wrong} of {len(contract.CHECKS)} checks passed in {time.perf_counter() - start:.1f} s"
-    )
+    typer.echo(f"{len(results) - wrong} of {len(contract.CHECKS)} checks passed in {time.perf_counter() - start:.1f} s")
     if json is not None:
-        write_json(json, {"schema": 1, "model": model, "checks": [vars(verdict) for verdict in verdicts]})
+        write_json(json, {"schema": 1, "model": model, "checks": [vars(result) for result in results]})
     if wrong:
         raise typer.Exit(1)

@@ -1,210 +1,135 @@
-"""`simgap run hide-and-seek`: hide effects in simulated rigs, diagnose, and count what was found."""
+"""The recovery study, `simgap run recovery`: hide effects in simulated rigs and count what a diagnosis names."""
 
 from __future__ import annotations
 
 import json
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from itertools import product
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 
-from simgap.records import Dataset, UnusableInput
-from simgap.running.workers import Limits, prepare_worker, threads_per_worker
+from simgap.diagnosis.cases import Case, CaseResult, solve
+from simgap.records import Status, UnusableInput
+from simgap.results import lines, store
+from simgap.running.execution import Execution, carry_out
+from simgap.running.fitting import reason
+from simgap.running.source import closure
 
-FILE = Path("hide-and-seek") / "cases.jsonl"
-# What an oracle that is told the effect must gain for the effect to count as visible.
-VISIBLE_GAIN = 0.03  # of the squared error on the test experiments
-VISIBLE_RATIO = 15.0  # log-likelihood
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is hidden where: effects, comma-separated, with one strength; noise and its colour; the seed of the data."""
-
-    rig: str
-    effects: str
-    strength: float
-    noise: float
-    colour: float
-    seed: int
-
-    def hidden(self) -> dict[str, float]:
-        """Effect to strength."""
-        return dict.fromkeys(self.effects.split(","), self.strength) if self.effects else {}
+FILE = Path("recovery") / "cases.jsonl"
+# The code that decides a case; where it changes, stored cases are computed again.
+ROOMS = ("diagnosis", "error_views", "findings", "metrics", "greybox", "baselines", "data.simulated")
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """One case: what an oracle sees, and what the diagnosis said."""
+class Grid:
+    """The cases of a study: every effect on every rig that it suits with each strength, noise and colour, `pairs` of
+    two effects at once, and `clean` rigs with nothing hidden. No rigs: all of them.
+    """
+
+    rigs: tuple[str, ...] = ()
+    strengths: tuple[float, ...] = (1.0, 0.5, 0.25)
+    noises: tuple[float, ...] = (0.02, 0.05, 0.2)
+    colours: tuple[float, ...] = (0.0,)
+    pairs: int = 60
+    clean: int = 300
+    seeds: int = 1
+
+    def cases(self) -> Iterator[Case]:
+        """All cases; the seed of a case depends on nothing but its place. Raises UnusableInput for an unknown rig."""
+        from simgap.data.simulated.rigs import RIGS, suitable
+
+        chosen = self.rigs or tuple(RIGS)
+        for rig in chosen:
+            if rig not in RIGS:
+                raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(RIGS)}")
+        for seed, rig in product(range(self.seeds), chosen):
+            effects = (*suitable(rig), *suitable(rig, outside=True))
+            for effect, *settings in product(effects, self.strengths, self.noises, self.colours):
+                yield Case(rig, effect, *map(float, settings), seed)
+        rng = np.random.default_rng(1)
+        for i in range(self.pairs):
+            rig = str(rng.choice(chosen))
+            both = sorted(map(str, rng.choice(suitable(rig), 2, replace=False)))
+            yield Case(rig, ",".join(both), 1.0, 0.05, 0.0, 1000 + i)
+        for i in range(self.clean):
+            rig = chosen[i % len(chosen)]
+            yield Case(rig, "", 0.0, (0.02, 0.05, 0.1, 0.2)[i // 3 % 4], (0.0, 0.6, 0.9)[i % 3], 5000 + i)
+
+
+@dataclass(frozen=True)
+class CaseJob:
+    """One case as work for an engine."""
 
     case: Case
-    visible: bool
-    oracle_gain: float  # share of the squared error on the test experiments
-    oracle_ratio: float  # log-likelihood ratio in training
-    verdict: str
-    named: tuple[str, ...]
-    confounded: tuple[tuple[str, ...], ...]
-    gain: float
-    seconds: float
-    error: str = ""
+    code_sha256: str
+    preload: tuple[str, ...] = ("simgap.diagnosis.recovery",)
+    gpus: float = 0.0
 
-    @property
-    def right(self) -> bool:
-        """Whether the answer is right: nothing for nothing, unexplained for what no catalogue holds, else the name.
+    def __str__(self) -> str:
+        return str(self.case)
 
-        A pair that is said to be confounded is right if the truth is in it. Of two effects both must be named.
-        """
-        from simgap.registry import EFFECTS
+    def execute(self) -> list[CaseResult]:
+        """Diagnose; whatever is raised becomes the row."""
+        try:
+            return [replace(solve(self.case), code_sha256=self.code_sha256)]
+        except BaseException as error:
+            return self.failed("error", reason("the diagnosis", error))
 
-        hidden = self.case.effects.split(",") if self.case.effects else []
-        if not hidden:
-            return self.verdict == "nothing_found"
-        if any(name not in EFFECTS for name in hidden):
-            return self.verdict == "unexplained"
-        answers = [{name, *others} for name, others in zip(self.named, self.confounded, strict=True)]
-        if len(hidden) == 1:
-            return bool(answers) and hidden[0] in answers[0]
-        return all(any(name in answer for answer in answers) for name in hidden)
+    def failed(self, status: Status, message: str) -> list[CaseResult]:
+        """The row that says why there is no answer."""
+        return [CaseResult(self.case, status, message, code_sha256=self.code_sha256)]
+
+    def portable(self) -> CaseJob:
+        """A case names no files."""
+        return self
+
+    def has_its_code(self) -> bool:
+        """Whether rigs and diagnosis are those of the digest."""
+        return self.code_sha256 == code_sha256()
 
 
-def hide_and_seek(
-    rigs: Sequence[str] = (),
-    strengths: Sequence[float] = (1.0, 0.5, 0.25),
-    noises: Sequence[float] = (0.02, 0.05, 0.2),
-    colours: Sequence[float] = (0.0,),
-    pairs: int = 60,
-    clean: int = 300,
-    seeds: int = 1,
-    jobs: int = 1,
-    out: str | Path = "results",
-    tell: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Outcome]:
-    """Every effect on every rig that it suits, `pairs` of two at once, and `clean` rigs with nothing hidden.
+def recovery(
+    grid: Grid | None = None, execution: Execution | None = None, timeout: float = 600.0, memory: float = 8.0
+) -> list[CaseResult]:
+    """The results of all cases, those stored by an earlier call with the same code included.
 
-    Outcomes are stored one by one; a second call runs what is missing. Raises UnusableInput for an unknown rig.
+    `timeout` in seconds and `memory` in GiB are for one case. A case that raises, hangs or ends its process is a
+    result with its reason, and is computed again by the next call. Raises UnusableInput.
     """
-    cases = list(plan(rigs, strengths, noises, colours, pairs, clean, seeds))
-    file = Path(out) / FILE
-    known = {outcome.case: outcome for outcome in read(file)}
-    todo = [case for case in cases if case not in known]
-    file.parent.mkdir(parents=True, exist_ok=True)
-    tell(len(cases) - len(todo), len(cases))
-    if todo:
-        workers = min(jobs, len(todo))
-        context = multiprocessing.get_context("spawn")
-        limits = Limits(threads_per_worker(workers))
-        with (
-            ProcessPoolExecutor(workers, context, prepare_worker, (limits,)) as pool,
-            file.open("a", encoding="utf-8") as lines,
-        ):
-            try:
-                for future in as_completed([pool.submit(seek, case) for case in todo]):
-                    outcome = future.result()
-                    known[outcome.case] = outcome
-                    lines.write(json.dumps(asdict(outcome)) + "\n")
-                    lines.flush()
-                    tell(sum(case in known for case in cases), len(cases))
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    execution = execution or Execution()
+    cases = list((grid or Grid()).cases())
+    engine = execution.start(timeout, memory)
+    file = store.writable(execution.out) / FILE
+    digest = code_sha256()
+    known = {row.case: row for row in read(file) if row.status == "ok" and row.code_sha256 == digest}
+    todo = [CaseJob(case, digest) for case in cases if case not in known]
+    if len(todo) < len(cases):
+        execution.note(f"{len(cases) - len(todo)} of {len(cases)} cases are done already and were not run again")
+
+    def keep(rows: Sequence[CaseResult]) -> None:
+        text = "".join(json.dumps(store.plain(asdict(row)), allow_nan=False) + "\n" for row in rows)
+        lines.append(file, text.encode(), store.lock_of(execution.out))
+
+    for rows in carry_out(engine, todo, keep, execution.listener):
+        known |= {row.case: row for row in rows}
     return [known[case] for case in cases]
 
 
-def plan(
-    rigs: Sequence[str],
-    strengths: Sequence[float],
-    noises: Sequence[float],
-    colours: Sequence[float],
-    pairs: int,
-    clean: int,
-    seeds: int,
-) -> Iterator[Case]:
-    """All cases; the seed of a case depends on nothing but its place."""
-    from simgap.data.simulated.rigs import RIGS, suitable
-
-    chosen = tuple(rigs) or tuple(RIGS)
-    for rig in chosen:
-        if rig not in RIGS:
-            raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(RIGS)}")
-    for seed in range(seeds):
-        for rig in chosen:
-            for effect in (*suitable(rig), *suitable(rig, outside=True)):
-                for strength in strengths:
-                    for noise in noises:
-                        for colour in colours:
-                            yield Case(rig, effect, float(strength), float(noise), float(colour), seed)
-    rng = np.random.default_rng(1)
-    for i in range(pairs):
-        rig = str(rng.choice(chosen))
-        both = sorted(map(str, rng.choice(suitable(rig), 2, replace=False)))
-        yield Case(rig, ",".join(both), 1.0, 0.05, 0.0, 1000 + i)
-    for i in range(clean):
-        rig = chosen[i % len(chosen)]
-        yield Case(rig, "", 0.0, (0.02, 0.05, 0.1, 0.2)[i // 3 % 4], (0.0, 0.6, 0.9)[i % 3], 5000 + i)
-
-
-def read(file: Path) -> Iterator[Outcome]:
-    """The stored outcomes; a line that was torn by a crash is run again."""
-    for line in file.read_bytes().splitlines() if file.is_file() else ():
+def read(file: Path) -> Iterator[CaseResult]:
+    """The stored results; a line that is none, such as one torn by a crash, is left out and so computed again."""
+    for line in lines.read(file) if file.is_file() else ():
         try:
-            row = json.loads(line)
-            yield Outcome(**(row | {
-                "case": Case(**row["case"]), "named": tuple(row["named"]),
-                "confounded": tuple(map(tuple, row["confounded"])),
-            }))  # fmt: skip
-        except (ValueError, TypeError, KeyError, RecursionError):
+            yield msgspec.json.decode(line, type=CaseResult)
+        except (msgspec.MsgspecError, ValueError, RecursionError):
             continue
 
 
-def seek(case: Case) -> Outcome:
-    """Make the data, ask the oracle, diagnose."""
-    from simgap.data.simulated.rigs import hide
-    from simgap.diagnosis.diagnose import diagnose
-
-    dataset = hide(case.rig, case.hidden(), case.noise, case.colour, case.seed)
-    try:
-        gain, ratio = oracle(dataset, tuple(case.hidden()))
-        answer = diagnose(dataset, views_too=False)
-    except Exception as error:  # a row of the table, like a model that fails
-        return Outcome(case, False, 0.0, 0.0, "error", (), (), 0.0, 0.0, f"{type(error).__name__}: {error}")
-    before, after = answer.findings.gain.before, answer.findings.gain.after
-    name = next(iter(before))
-    return Outcome(
-        case,
-        gain > VISIBLE_GAIN and ratio > VISIBLE_RATIO,
-        gain,
-        ratio,
-        answer.verdict,
-        tuple(cause.effect for cause in answer.causes),
-        tuple(tuple(s.effect for s in cause.confounded_with) for cause in answer.causes),
-        1 - (after[name] / before[name]) ** 2,
-        answer.seconds,
-    )
-
-
-def oracle(dataset: Dataset, hidden: Sequence[str]) -> tuple[float, float]:
-    """What the grey box gains that is told the effects: share of the squared test error, and log-likelihood ratio."""
-    from simgap.diagnosis import gains
-    from simgap.registry import EFFECTS, MODELS
-
-    if not hidden or any(name not in EFFECTS for name in hidden):
-        return (1.0, np.inf) if hidden else (0.0, 0.0)  # what is outside the catalogue is taken to be visible
-    squares, likelihood = [], []
-    for effects in ((), tuple(hidden)):
-        model: Any = MODELS["greybox"](effects=effects)
-        model.fit(dataset.training, 0)
-        runs = [
-            model.simulate_anew(x, dataset.n_init) if effects else gains.free_run(model, x, dataset.n_init)
-            for x in dataset.test
-        ]
-        errors = [
-            np.sum((x.y[dataset.n_init :, 0] - run[:, 0]) ** 2) for x, run in zip(dataset.test, runs, strict=True)
-        ]
-        squares.append(sum(errors))
-        likelihood.append(model.log_likelihood())
-    ratio = likelihood[1] - likelihood[0] + sum(off.log_likelihood_ratio for p in model.plants for off in p.outliers)
-    return float(1 - squares[1] / squares[0]), float(ratio)
+@cache
+def code_sha256() -> str:
+    """Digest of the code that decides a case: rigs, grey box, effects and diagnosis."""
+    within = tuple(f"simgap.{room}" for room in ROOMS)
+    return closure({"simgap.diagnosis.cases": None}, within=within).sha256()

@@ -11,8 +11,9 @@ from simgap.error_views import chance
 from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
-from simgap.error_views.wording import amount, between, number, off, percent, rate, span
+from simgap.error_views.wording import between, error, mean_error, rate, span
 from simgap.findings import ViewName, Wrong
+from simgap.wording import amount, number, percent
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency
 
@@ -27,7 +28,7 @@ def offset(e: Errors) -> Iterator[Wrong]:
         share, p = chance.by_experiments(e.error, e.experiment, np.zeros(n, dtype=int), 0.0)
     else:
         share, p = chance.by_trend(e.error, np.full(len(e.error), mean), 1, 1, e.experiment)
-    text = f"The simulation of {e.channel.name} is {off(mean, e.channel.unit)} on average: {_squared(share)}."
+    text = f"The simulation of {e.channel.name} is {mean_error(mean, e.channel.unit)} on average: {_squared(share)}."
     yield Wrong("offset", e.channel.name, share, p, text, (0.0,), (mean,), "")
 
 
@@ -45,8 +46,8 @@ def time_since_start(e: Errors) -> Iterator[Wrong]:
     rms = np.sqrt(np.bincount(bins.labels, e.error**2) / np.bincount(bins.labels))
     first, last = span(*bins.ends[0]), span(*bins.ends[-1])
     text = (
-        f"The simulation of {e.channel.name} is {off(mean[0], unit)} {first} after the start (RMS error "
-        f"{amount(rms[0], unit)}) and {off(mean[-1], unit)} {last} after it (RMS error {amount(rms[-1], unit)}): "
+        f"The simulation of {e.channel.name} is {mean_error(mean[0], unit)} {first} after the start (RMS error "
+        f"{error(rms[0], unit)}) and {mean_error(mean[-1], unit)} {last} after it (RMS error {error(rms[-1], unit)}): "
         f"{_squared(share)}."
     )
     yield Wrong("time since the start", e.channel.name, share, p, text, bins.centres, _floats(mean), "s")
@@ -108,11 +109,11 @@ def band(e: Errors) -> Iterator[Wrong]:
     best, share, p = chance.by_bands(power, label)
     edges = np.concatenate([[0.0], OCTAVES])
     low, high = edges[best], edges[best + 1]
-    place = between(low * nyquist, high * nyquist, "Hz") if best else f"below {amount(high * nyquist, 'Hz', 3)}"
+    place = between(low * nyquist, high * nyquist, "Hz") if best else f"below {amount(high * nyquist, 'Hz')}"
     variance = sum(float(part @ part) for part in centred) / len(e.error)
     share = min(1.0, share * variance / float(np.mean(e.error**2)))
     text = (
-        f"The error of {name} is strongest {place} ({number(low)} to {number(high)} of the Nyquist frequency): "
+        f"The error of {name} is strongest {place} ({number(low, 2)} to {number(high, 2)} of the Nyquist frequency): "
         f"{_squared(share)}, beyond what white noise would have there."
     )
     filled = np.unique(label)
@@ -129,8 +130,8 @@ def _by_mean(
     high, low = int(np.argmax(mean)), int(np.argmin(mean))
     unit = e.channel.unit
     text = (
-        f"The simulation of {e.channel.name} is {off(mean[high], unit)} in {labels[high]} and "
-        f"{off(mean[low], unit)} in {labels[low]}: {_squared(share)}."
+        f"The simulation of {e.channel.name} is {mean_error(mean[high], unit)} in {labels[high]} and "
+        f"{mean_error(mean[low], unit)} in {labels[low]}: {_squared(share)}."
     )
     return Wrong(view, e.channel.name, share, p, text, _counted(mean), _floats(mean), "")
 
@@ -142,7 +143,7 @@ def _by_size(
     count, squared = np.bincount(of_sample), np.bincount(of_sample, e.error**2)
     rms = np.sqrt(squared / count)
     high, low = int(np.argmax(rms)), int(np.argmin(rms))
-    most, least = amount(rms[high], e.channel.unit), amount(rms[low], e.channel.unit)
+    most, least = error(rms[high], e.channel.unit), error(rms[low], e.channel.unit)
     text = (
         f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
         f"those above the average hold {percent(share)} more of the squared error than of the samples."
@@ -151,7 +152,7 @@ def _by_size(
 
 
 def _signed(value: float, unit: str) -> str:
-    return ("+" if value > 0 else "") + amount(value, unit)
+    return ("+" if value > 0 else "") + error(value, unit)
 
 
 def _squared(share: float) -> str:

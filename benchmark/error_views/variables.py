@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
-from simgap.error_views.wording import amount, between, span
+from simgap.error_views.wording import between, span
+from simgap.wording import amount
 
 LEAST = 20  # samples in a bin
 MOST = 10  # bins
@@ -64,7 +65,7 @@ def bin_values(values: Float[np.ndarray, " N"], name: str, unit: str, most: int 
     ends = tuple(pairwise(outer))
     labels = np.full(len(values), -1)
     labels[known] = inside
-    ranges = [amount(value, unit, 3) for value in distinct] if single else [between(*limits, unit) for limits in ends]
+    ranges = [amount(value, unit) for value in distinct] if single else [between(*limits, unit) for limits in ends]
     return Bins(labels, tuple(map(float, centres)), tuple(f"where the {name} is {text}" for text in ranges), ends)
 
 

@@ -19,10 +19,11 @@ from simgap.error_views.variables import (
     by_experiment,
     derivative,
 )
-from simgap.error_views.wording import off, percent, rate
+from simgap.error_views.wording import mean_error, rate
 from simgap.findings import ViewName, Wrong
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
+from simgap.wording import percent
 
 NEGLIGIBLE = 1e-12  # an error this much smaller than the signal is rounding
 SMALLEST = 1e-150  # an error whose square is still a float
@@ -113,8 +114,8 @@ def _binned(e: Errors, variable: _Variable, bins: Bins) -> Wrong:
     high, low = _extremes(mean, count, parents)
     name, e_unit = e.channel.name, e.channel.unit
     text = (
-        f"The simulation of {name} is {off(mean[high], e_unit)} {bins.where[high]} and "
-        f"{off(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
+        f"The simulation of {name} is {mean_error(mean[high], e_unit)} {bins.where[high]} and "
+        f"{mean_error(mean[low], e_unit)} {bins.where[low]}: {percent(share)} of its squared error"
         f"{', beyond what the direction explains' if bins.parents else ''}."
     )
     error = tuple(map(float, mean))

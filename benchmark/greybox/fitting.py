@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.levenberg import minimise
 from simgap.greybox.noise import Noise
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
@@ -15,6 +16,7 @@ from simgap.greybox.simulation import Simulator
 
 LARGEST_ERROR = 1e60  # of a simulation that grows without bound; its square is still a number
 DIFFERENCE = 1e-5  # of a parameter's size: the step of its numerical slope
+INITIAL_STEPS = 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +37,17 @@ class Problem:
     def __init__(self, plant: Plant, records: Records, noise: Noise) -> None:
         self.plant, self.records, self.noise = plant, records, noise
         self.simulator = Simulator(plant, records.u)
-        self._spread = np.std(records.y[records.mask], axis=0) + 1e-12
+        # Finite differences are in proportion to the readings in training, not to those of the few samples at hand.
+        spread = [s.y_rms for s in plant.scales.outputs] if plant.scales else np.std(records.y[records.mask], axis=0)
+        self._spread = np.asarray(spread) + 1e-12
+
+    def only(self, experiments: np.ndarray) -> Problem:
+        """Return the same problem for some of the experiments."""
+        return (
+            self
+            if len(experiments) == len(self.records.u)
+            else Problem(self.plant, self.records.only(experiments), self.noise)
+        )
 
     def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
         """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
@@ -49,6 +61,10 @@ class Problem:
         white = self.noise.whiten(errors)
         value = float(np.vdot(white, white))
         return value if np.isfinite(value) else np.inf
+
+    def squares_of_each(self, errors: np.ndarray) -> Float[np.ndarray, " E"]:
+        """Sum the squares of the whitened errors of each experiment."""
+        return np.sum(self.noise.whiten(errors) ** 2, axis=(1, 2))
 
     def at_rest(self, theta: np.ndarray) -> Float[np.ndarray, "E q"]:
         """Guess the initial states of a plant that stood at its first reading."""
@@ -73,7 +89,7 @@ class Problem:
         guess = local.copy()
         guess[:, : self.plant.order] = self.at_rest(theta)[:, : self.plant.order]
         starts = np.stack([local, local * sides, guess, guess * sides])  # [4, E, q]
-        squares = [np.sum(self.noise.whiten(self.errors(theta, start)) ** 2, axis=(1, 2)) for start in starts]
+        squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
         return starts[np.argmin(squares, axis=0), np.arange(len(local))]
 
     def jacobian(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Jacobian:
@@ -130,48 +146,107 @@ class Problem:
         max_steps: int = 40,
         tolerance: float = 1e-3,
     ) -> Estimate:
-        """Fit by Levenberg-Marquardt within the bounds; per-experiment numbers are eliminated from every step.
+        """Fit theta and the numbers of each experiment by Levenberg-Marquardt, within the bounds.
 
-        It ends when the gain that the quadratic model promises is below `tolerance` of the variance of the noise,
-        so that twice the log-likelihood is known to about `tolerance`.
+        Where all of theta is `fixed`, every experiment is a fit of its own, so that none changes another's. A fit ends
+        when the gain that the quadratic model promises is below `tolerance` of the variance of the noise, so that
+        twice the log-likelihood is known to about `tolerance`.
         """
         plant = self.plant
-        low, high = plant.low, plant.high
         free = plant.free if fixed is None else plant.free & ~fixed
-        theta = np.clip(theta, low, high)
+        theta = np.clip(theta, plant.low, plant.high)
         local = self.at_rest(theta) if local is None else local.copy()
         if plant.sign_hidden:
             local = self.other_side(theta, local)
-        errors = self.errors(theta, local)
-        squares, damping, converged = self.squares(errors), 1e-3, False
-        experiments = len(local)
-        for _ in range(max_steps if np.isfinite(squares) else 0):
-            jacobian = self.jacobian(theta, local, free)
-            if not (np.isfinite(jacobian.theta).all() and np.isfinite(jacobian.local).all()):
-                break
-            white = self.noise.whiten(errors).reshape(experiments, -1)  # [E, M]
-            normal = NormalEquations.of(jacobian, white)
-            inside = free & ~((theta <= low) & (normal.gradient < 0)) & ~((theta >= high) & (normal.gradient > 0))
-            step, promised = normal.step(inside, 1e-9)
-            if not promised > tolerance * squares / max(1, self.records.samples * plant.ny):
-                converged = True
-                break
-            while damping < 1e10:
-                (step, local_step), _ = normal.step(inside, damping)
-                trial = np.clip(theta + step, low, high)
-                trial_local = local + local_step
-                trial_errors = self.errors(trial, trial_local)
-                trial_squares = self.squares(trial_errors)
-                if trial_squares < squares:
-                    break
-                damping = max(damping * 6, 1e-6)
-            else:
-                converged = True
-                break
-            crawls = squares - trial_squares < 1e-6 * tolerance * squares
-            theta, local, errors, squares = trial, trial_local, trial_errors, trial_squares
-            damping = max(damping / 10, 1e-12)
-            if crawls:
-                converged = True
-                break
-        return Estimate(plant, theta, local, errors, squares, converged)
+        descent = _Together(self, theta, local, free) if free.any() else _OneByOne(self, theta, local)
+        converged = minimise(descent, max_steps, tolerance)
+        squares = self.squares(descent.errors)
+        return Estimate(plant, descent.theta, descent.local, descent.errors, squares, bool(converged.all()))
+
+
+class _Together:
+    """The descent of theta and of the numbers of all experiments: one group."""
+
+    def __init__(self, problem: Problem, theta: np.ndarray, local: np.ndarray, free: np.ndarray) -> None:
+        self.problem, self.theta, self.local, self.free = problem, theta, local, free
+        self.errors = problem.errors(theta, local)
+        self.squares = np.array([problem.squares(self.errors)])
+        self.samples = np.array([problem.records.samples * problem.plant.ny])
+
+    def linearise(self, groups: np.ndarray) -> Float[np.ndarray, " 1"]:
+        """Compute the normal equations and the gain that they promise."""
+        problem, theta = self.problem, self.theta
+        jacobian = problem.jacobian(theta, self.local, self.free)
+        if not jacobian.finite:
+            return np.array([np.nan])
+        white = problem.noise.whiten(self.errors).reshape(len(self.local), -1)  # [E, M]
+        self._normal = normal = NormalEquations.of(jacobian, white)
+        outwards = (theta <= problem.plant.low) & (normal.gradient < 0)
+        outwards |= (theta >= problem.plant.high) & (normal.gradient > 0)
+        self._inside = self.free & ~outwards
+        return np.array([normal.step(self._inside, 1e-9)[1]])
+
+    def attempt(self, groups: np.ndarray, damping: Float[np.ndarray, " 1"]) -> Float[np.ndarray, " 1"]:
+        """Compute the squares after a damped step."""
+        (step, local_step), _ = self._normal.step(self._inside, float(damping[0]))
+        theta = np.clip(self.theta + step, self.problem.plant.low, self.problem.plant.high)
+        local = self.local + local_step
+        errors = self.problem.errors(theta, local)
+        self._attempted = theta, local, errors
+        return np.array([self.problem.squares(errors)])
+
+    def accept(self, groups: np.ndarray, squares: np.ndarray) -> None:
+        """Take the step that was attempted."""
+        if len(groups):
+            self.theta, self.local, self.errors = self._attempted
+            self.squares = squares
+
+
+class _OneByOne:
+    """The descents of the numbers of each experiment, side by side; theta stays as it is."""
+
+    def __init__(self, problem: Problem, theta: np.ndarray, local: np.ndarray) -> None:
+        self.problem, self.theta, self.local = problem, theta, local
+        self.errors = problem.errors(theta, local)
+        self.squares = problem.squares_of_each(self.errors)
+        self.samples = np.maximum(1, problem.records.mask.sum(axis=1)) * problem.plant.ny
+
+    def linearise(self, groups: np.ndarray) -> Float[np.ndarray, " G"]:
+        """Compute the normal equations of these experiments and the gains that they promise."""
+        problem = self.problem.only(groups)
+        jacobian = problem.jacobian(self.theta, self.local[groups], np.zeros(len(self.theta), dtype=bool))
+        white = problem.noise.whiten(self.errors[groups]).reshape(len(groups), -1)  # [G, M]
+        self._groups, self._normal = groups, NormalEquations.of(jacobian, white)
+        usable = np.isfinite(self._normal.blocks).all(axis=(1, 2))
+        promised = np.full(len(groups), np.nan)
+        promised[usable] = self._normal.only(usable).promised_by_each()
+        return promised
+
+    def attempt(self, groups: np.ndarray, damping: Float[np.ndarray, " G"]) -> Float[np.ndarray, " G"]:
+        """Compute the squares of these experiments after damped steps."""
+        normal = self._normal.only(np.searchsorted(self._groups, groups))
+        problem = self.problem.only(groups)
+        local = self.local[groups] + normal.steps_of_each(damping)
+        errors = problem.errors(self.theta, local)
+        squares = problem.squares_of_each(errors)
+        self._attempted = groups, local, errors
+        return squares
+
+    def accept(self, groups: np.ndarray, squares: np.ndarray) -> None:
+        """Take the steps of these experiments."""
+        attempted, local, errors = self._attempted
+        rows = np.searchsorted(attempted, groups)
+        self.local[groups], self.errors[groups], self.squares[groups] = local[rows], errors[rows], squares
+
+
+def initial_states(
+    plant: Plant,
+    theta: Float[np.ndarray, " p"],
+    u: Float[np.ndarray, "B n nu"],
+    y: Float[np.ndarray, "B n ny"],
+    noise: Noise,
+) -> Float[np.ndarray, "B q"]:
+    """Find the states at the first sample of each record from its n measured samples; the model is known."""
+    records = Records(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), plant.dt)
+    fixed = np.ones(plant.size, dtype=bool)
+    return Problem(plant, records, noise).fit(theta, fixed=fixed, max_steps=INITIAL_STEPS).local

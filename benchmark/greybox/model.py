@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.initial_states import initial_states
+from simgap.greybox.fitting import Estimate, Problem, initial_states
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant

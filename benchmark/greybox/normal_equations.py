@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,11 @@ class Jacobian:
 
     theta: Float[np.ndarray, "p E M"]
     local: Float[np.ndarray, "q E M"]
+
+    @property
+    def finite(self) -> bool:
+        """Whether all slopes are numbers."""
+        return bool(np.isfinite(self.theta).all() and np.isfinite(self.local).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +38,30 @@ class NormalEquations:
         e = white[:, :, None]
         return cls((j @ jt).sum(0), (j @ e).sum(0)[:, 0], j @ kt, k @ kt, (k @ e)[:, :, 0])
 
+    def only(self, experiments: np.ndarray) -> NormalEquations:
+        """Return the equations of some experiments, theta being known."""
+        return replace(
+            self, cross=self.cross[experiments], blocks=self.blocks[experiments],
+            block_gradient=self.block_gradient[experiments],
+        )  # fmt: skip
+
+    def steps_of_each(self, damping: float | np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Compute the damped steps of the per-experiment numbers, theta being known."""
+        return np.linalg.solve(self._damped(damping), self.block_gradient[:, :, None])[:, :, 0]
+
+    def promised_by_each(self) -> Float[np.ndarray, " E"]:
+        """Compute the gain that a whole step of each experiment promises, theta being known."""
+        return np.sum(self.steps_of_each(1e-9) * self.block_gradient, axis=1)
+
+    def _damped(self, damping: float | np.ndarray) -> Float[np.ndarray, "E q q"]:
+        blocks, i = self.blocks.copy(), np.arange(self.blocks.shape[1])
+        largest = np.max(blocks, axis=(1, 2), initial=0.0)[:, None]
+        blocks[:, i, i] = blocks[:, i, i] * (1 + np.reshape(damping, (-1, 1))) + 1e-12 * largest + 1e-300
+        return blocks
+
     def reduced(self, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Eliminate the per-experiment numbers: J' J of theta, and what turns steps of theta into theirs."""
-        blocks = self.blocks.copy()
-        i = np.arange(blocks.shape[1])
-        blocks[:, i, i] = blocks[:, i, i] * (1 + damping) + 1e-12 * np.max(blocks, axis=(1, 2))[:, None] + 1e-300
+        blocks = self._damped(damping)
         weights = np.linalg.solve(blocks, self.cross.swapaxes(1, 2))  # [E, q, p]
         starts = np.linalg.solve(blocks, self.block_gradient[:, :, None])[:, :, 0]  # [E, q]
         h = self.h - (self.cross @ weights).sum(0)

@@ -40,6 +40,10 @@ class Records:
             experiments[0].dt,
         )
 
+    def only(self, experiments: np.ndarray) -> Records:
+        """Return some of the experiments."""
+        return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt)
+
     @property
     def duration(self) -> float:
         """Duration of the longest experiment, in s."""

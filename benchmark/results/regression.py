@@ -11,22 +11,20 @@ from pathlib import Path
 from typing import Literal
 
 from simgap.records import Result, UnusableInput
-from simgap.registry import MODELS
 from simgap.results import store
-from simgap.running.suites import load_suite
 
-Verdict = Literal["same", "better", "worse", "missing", "new"]
+Change = Literal["same", "better", "worse", "missing", "new"]
 
-# Share by which an RMSE may grow (design, section 6): of a model that computes, and of one that is trained from random
-# weights, where three times the spread of its seeds counts if that is more.
+# Share by which an RMSE may grow: of a model that computes, and of one whose numbers depend on the seed, where three
+# times the spread of its seeds counts if that is more.
 COMPUTED = 1e-6
-TRAINED = 0.05
+STOCHASTIC = 0.05
 SIGMAS = 3.0
 # Share of the spread of what was measured below which an RMSE is rounding.
 ROUNDING = 1e-9
 ON_AVERAGE = "on average"
 
-Name = tuple[str, str, str]  # experiment, task, and output with its horizon
+FigureName = tuple[str, str, str]  # experiment, task, and output with its horizon
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Comparison:
     before: float | None
     after: float | None
     limit: float
-    verdict: Verdict
+    verdict: Change
     why: str = ""
 
 
@@ -65,9 +63,10 @@ class Regression:
 def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
     """Compare the results in a folder with those of a reference, suite by suite.
 
-    An RMSE is worse when it exceeds the reference by more than 1e-6 of it or, for networks, by more than
-    max(3 sigma of the reference's seeds, 5 %); so is their geometric mean per model and data set. A row of the
-    reference is missing when the new results lack it although they have its seed. Raises UnusableInput.
+    An RMSE is worse when it exceeds the reference by more than 1e-6 of it or, for a model that declares itself
+    stochastic, by more than max(3 sigma of the reference's seeds, 5 %); so is their geometric mean per model and data
+    set. A row of the reference is missing when the new results lack it although they have its seed. Raises
+    UnusableInput.
     """
     new, reference = Path(new), Path(reference)
     for folder in (new, reference):
@@ -88,13 +87,12 @@ def check(new: str | Path, reference: str | Path = Path("reports") / "results") 
 
 def compare(suite: str, before: Sequence[Result], after: Sequence[Result]) -> list[Comparison]:
     """All comparisons of a suite, model by model and data set by data set."""
-    trained = _trained(suite)
     theirs, ours = _grouped(before), _grouped(after)
     seeds = {row.seed for row in after}
     found: list[Comparison] = []
     for group, rows in theirs.items():
         model, _, dataset = group
-        group_of = _Group(suite, model, dataset, rows, ours.get(group, []), model in trained)
+        group_of = _Group(suite, model, dataset, rows, ours.get(group, []))
         found += group_of.row_by_row(seeds)
         found += group_of.on_average()
     for group in ours.keys() - theirs.keys():
@@ -111,7 +109,6 @@ class _Group:
     dataset: str
     before: list[Result]
     after: list[Result]
-    trained: bool
 
     def row_by_row(self, seeds: set[int]) -> Iterator[Comparison]:
         """Every figure of every row of the reference whose seed was run."""
@@ -141,34 +138,40 @@ class _Group:
             return
         was, is_now = (math.exp(statistics.fmean(of[seed] for seed in shared)) for of in (before, after))
         sigma = statistics.stdev(before.values()) / math.sqrt(len(shared)) if len(before) > 1 else 0.0
-        limit = was * math.exp(max(SIGMAS * sigma, math.log1p(TRAINED)))
+        limit = was * math.exp(max(SIGMAS * sigma, math.log1p(STOCHASTIC)))
         yield self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 
     def _allowed(self, value: float, sigma: float, scale: float) -> float:
         if not math.isfinite(value):
             return 0.0
-        if self.trained or sigma > COMPUTED * value:
-            return max(SIGMAS * sigma, TRAINED * value)
+        if self._stochastic or sigma > COMPUTED * value:
+            return max(SIGMAS * sigma, STOCHASTIC * value)
         return COMPUTED * value + ROUNDING * scale
 
     def _judged(
         self, figure: str, seed: int | None, before: float, after: float, limit: float, row: Result | None
     ) -> Comparison:
         margin = limit - before if math.isfinite(before) else 0.0
-        verdict: Verdict = "worse" if after > limit else "better" if after < before - margin else "same"
+        verdict: Change = "worse" if after > limit else "better" if after < before - margin else "same"
         why = row.message if row is not None and row.status != "ok" and verdict == "worse" else ""
         return self._comparison(figure, seed, before, after, limit, verdict, why)
 
     def _comparison(
         self, figure: str, seed: int | None, before: float | None, after: float | None, limit: float,
-        verdict: Verdict, why: str = "",
+        verdict: Change, why: str = "",
     ) -> Comparison:  # fmt: skip
         return Comparison(self.suite, self.model, self.dataset, figure, seed, before, after, limit, verdict, why)
 
     @cached_property
-    def _spread(self) -> dict[Name, float]:
+    def _stochastic(self) -> bool:
+        """What the model declares, in the reference or, where no row of it says so, in the new results."""
+        rows = (*self.before, *self.after)
+        return next((row.provenance["stochastic"] is True for row in rows if "stochastic" in row.provenance), False)
+
+    @cached_property
+    def _spread(self) -> dict[FigureName, float]:
         """Standard deviation over the reference's seeds of each figure that has several and differs among them."""
-        values: dict[Name, list[float]] = {}
+        values: dict[FigureName, list[float]] = {}
         for row in self.before:
             for name, (value, _) in _figures(row).items():
                 if math.isfinite(value):
@@ -179,9 +182,9 @@ class _Group:
         }  # fmt: skip
 
 
-def _figures(row: Result) -> dict[Name, tuple[float, float]]:
+def _figures(row: Result) -> dict[FigureName, tuple[float, float]]:
     """Every RMSE of a row with the spread of what was measured: of the whole record, and at each horizon."""
-    found: dict[Name, tuple[float, float]] = {}
+    found: dict[FigureName, tuple[float, float]] = {}
     for output, figures in row.metrics.items():
         scale = float(figures.get("std", 0.0))
         if "rmse" in figures:
@@ -208,18 +211,6 @@ def _grouped(rows: Sequence[Result]) -> dict[tuple[str, str, str], list[Result]]
         model, params, dataset, *_ = store.key(row)
         groups.setdefault((model, params, dataset), []).append(row)
     return groups
-
-
-def _trained(suite: str) -> set[str]:
-    """The models of one of simgap's suites that start from random weights."""
-    try:
-        entries = load_suite(suite).models
-    except UnusableInput:  # a suite of somebody's own: then only its seeds can tell
-        return set()
-    return {
-        entry.label for entry in entries
-        if any(MODELS.module(str(name)).startswith("simgap.neural.") for name in (entry.name, *entry.params.values()))
-    }  # fmt: skip
 
 
 def _other_data(before: Sequence[Result], after: Sequence[Result]) -> list[str]:

@@ -16,12 +16,12 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.metrics import failed_metrics
-from simgap.protocol import Model
+from simgap.protocol import Model, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
 from simgap.running.provenance import provenance
-from simgap.running.workers import threads_per_worker
+from simgap.running.workers import threads_in_force
 from simgap.tasks import TASKS, USUAL, Task, Trial
 
 # Bytes of a model.json.
@@ -64,7 +64,7 @@ def fit(
     about = Result(
         model=model.rpartition(":")[2], params=plain(params or {}), dataset=dataset.name, experiment="",
         task="", seed=seed, status="ok",
-        provenance=provenance(threads_per_worker(1)) | {"data_sha256": dataset.sha256},
+        provenance=provenance(threads_in_force()) | {"data_sha256": dataset.sha256},
     )  # fmt: skip
     about = fit_model(built, dataset.training, about)
     return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
@@ -115,7 +115,8 @@ def build(reference: str, params: dict[str, Any]) -> Model:
 
 
 def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
-    """Fit the model; `about` comes back with what the fit chose, its size, seconds and warnings."""
+    """Fit the model; `about` comes back with what it declares and chose, its size, seconds, threads and warnings."""
+    threads = threads_in_force()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         start = time.perf_counter()
@@ -128,6 +129,7 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         n_params=int(n_params) if isinstance(n_params, int | np.integer) else None,
         fit_seconds=seconds,
         message=_shortened("; ".join(dict.fromkeys(str(w.message) for w in caught))),
+        provenance=about.provenance | {"threads": threads, "stochastic": is_stochastic(model)},
     )
 
 

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
+import inspect
 import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from simgap.metrics import failed_metrics
-from simgap.protocol import listen
 from simgap.records import Channels, Dataset, Result, Status
 from simgap.registry import MODELS
 from simgap.results.store import plain
+from simgap.running.engines.engine import shared_folder
 from simgap.running.fitting import build, fit_model, model_class, reason, score_model
-from simgap.running.provenance import source_sha256
+from simgap.running.source import Code, code_of
 from simgap.running.suites import Entry
 from simgap.tasks import TASKS
 
+# What takes seconds to import, by the package that a model's code imports. torch._dynamo is what the first step of an
+# optimiser imports.
+SLOW_IMPORTS = {"torch": ("torch", "torch._dynamo", "safetensors.torch")}
+
 
 @dataclass(frozen=True)
-class Source:
-    """Where a data set comes from: the arguments of `simgap.load`."""
+class LoadArguments:
+    """How to load a data set: the arguments of `simgap.load`."""
 
     data: str
     inputs: tuple[str, ...] = ()
@@ -55,14 +59,15 @@ class Card:
 
 @dataclass(frozen=True)
 class Job:
-    """One fit with all its simulations."""
+    """One fit with all its simulations; `preload` are modules that are imported once for all jobs."""
 
     entry: Entry
-    source: Source
+    arguments: LoadArguments
     card: Card
     seed: int
     tasks: tuple[str, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
+    preload: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.entry.label} on {self.card.name}, seed {self.seed}"
@@ -83,40 +88,55 @@ class Job:
             for task in self.tasks:
                 yield replace(self.about, experiment=experiment, task=task)
 
+    @property
+    def gpus(self) -> float:
+        """What a cluster sets apart for it."""
+        return self.entry.gpus
+
     def failed(self, status: Status, message: str) -> list[Result]:
         """All results of this job, saying that and why there are none."""
         metrics = failed_metrics(self.card.channels)
         return [replace(row, status=status, message=message, metrics=metrics) for row in self.owed()]
 
+    def execute(self) -> list[Result]:
+        """Fit and score. Whatever the model does short of ending the process becomes rows."""
+        try:
+            dataset = _load(self.arguments, self.card.sha256)
+        except Exception as error:  # the file may have changed since the parent read it
+            return self.failed("error", f"the data set could not be loaded again: {error}")
+        if dataset.sha256 != self.card.sha256:
+            return self.failed("error", "the data set changed while the run was under way; run again")
+        try:
+            model = build(self.entry.name, self.entry.params)
+            about = fit_model(model, dataset.training, self.about)
+        except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
+            return self.failed("error", reason("fit", error))
+        try:
+            return score_model(model, dataset, [TASKS[name]() for name in self.tasks], about)
+        except BaseException as error:
+            return self.failed("error", reason("simulate", error))
 
-def execute(job: Job) -> list[Result]:
-    """Fit and score. Whatever the model does short of ending the process becomes rows."""
-    try:
-        dataset = _load(job)
-    except Exception as error:  # the file may have changed since the parent read it
-        return job.failed("error", f"the data set could not be loaded again: {error}")
-    if dataset.sha256 != job.card.sha256:
-        return job.failed("error", "the data set changed while the run was under way; run again")
-    try:
-        listen(_note_of(job))
-        model = build(job.entry.name, job.entry.params)
-        about = fit_model(model, dataset.training, job.about)
-    except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
-        return job.failed("error", reason("fit", error))
-    try:
-        return score_model(model, dataset, [TASKS[name]() for name in job.tasks], about)
-    except BaseException as error:
-        return job.failed("error", reason("simulate", error))
+    def portable(self) -> Job:
+        """The same job with absolute paths."""
+        file, colon, name = self.entry.name.rpartition(":")
+        entry = replace(self.entry, name=f"{Path(file).absolute()}:{name}") if colon else self.entry
+        data = Path(self.arguments.data)
+        arguments = replace(self.arguments, data=str(data.absolute())) if data.exists() else self.arguments
+        return replace(self, entry=entry, arguments=arguments)
+
+    def has_its_code(self) -> bool:
+        """Whether the model's code is that of the digest."""
+        return model_code(self.entry).sha256() == self.provenance["model_sha256"]
 
 
-def _load(job: Job) -> Dataset:
-    """The job's data, which may take seconds to make: the first job of a run leaves them for the others."""
-    folder = os.environ.get("SIMGAP_RUN")
+def _load(arguments: LoadArguments, sha256: str) -> Dataset:
+    """The data, which may take seconds to make: the first job of a run leaves them for the others."""
+    folder = shared_folder()
     if folder is None:
-        return job.source.load()
-    file = Path(folder) / f"{job.card.sha256}.data"
+        return arguments.load()
+    file = Path(folder) / f"{sha256}.data"
     if not file.exists():
-        dataset = job.source.load()
+        dataset = arguments.load()
         partial = file.with_suffix(f".{os.getpid()}")
         with contextlib.suppress(OSError):  # a full disk must not end a fit
             partial.write_bytes(pickle.dumps(dataset))
@@ -125,22 +145,18 @@ def _load(job: Job) -> Dataset:
     return pickle.loads(file.read_bytes())  # from the run's own folder, which nobody else may write
 
 
-def model_sha256(entry: Entry) -> str:
-    """Digest of the code of the model, and of the other one that it is told to use, if it is. Raises UnusableInput."""
-    inner = [value for value in entry.params.values() if isinstance(value, str) and value in MODELS]
-    return "".join(source_sha256(model_class(name)) for name in (entry.name, *inner))
+def model_code(entry: Entry) -> Code:
+    """The code of the model, and of the others that its parameters name, if they do. Raises UnusableInput."""
+    kind = model_class(entry.name)
+    params = inspect.signature(kind).bind(**entry.params)
+    params.apply_defaults()
+    others = [text for text in _texts(params.arguments) if text in MODELS]
+    return code_of([kind, *map(model_class, others)])
 
 
-def progress_file(folder: str | Path, job: Job) -> Path:
-    """Where a worker notes how far a job is."""
-    return Path(folder) / hashlib.sha256(repr((str(job), job.entry)).encode()).hexdigest()[:24]
-
-
-def _note_of(job: Job) -> Callable[[int, int], None] | None:
-    folder = os.environ.get("SIMGAP_RUN")
-    return None if folder is None else lambda done, total: _note(progress_file(folder, job), done, total)
-
-
-def _note(file: Path, done: int, total: int) -> None:
-    with contextlib.suppress(OSError):  # a full disk must not end a fit
-        file.write_text(f"{done} {total}", encoding="ascii")
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for inner in value.values():
+            yield from _texts(inner)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +12,30 @@ from simgap.registry import DATASETS
 from simgap.results import store
 from simgap.results.store import plain
 from simgap.running.fitting import check_params
-from simgap.running.jobs import Card, Job, Source, model_sha256
+from simgap.running.jobs import SLOW_IMPORTS, Card, Job, LoadArguments, model_code
+from simgap.running.source import Code
 from simgap.running.suites import Entry, Suite
 
 Note = Callable[[str], None]
 
 
-def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[str], note: Note) -> list[Entry]:
-    """The models to run: those named in `models` and `files` (`file.py:Class`), or else the suite's.
+@dataclass(frozen=True)
+class Choice:
+    """What the user named in place of a suite's: models, files of models (`file.py:Class`), data sets."""
+
+    models: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    load_arguments: tuple[LoadArguments, ...] = ()
+
+
+def choose_entries(suite: Suite, choice: Choice, note: Note) -> list[Entry]:
+    """The models to run: those that the user named, or else the suite's.
 
     A name may be a label of the suite. One of the suite's that cannot be imported is noted and left out; one
     that the user named raises UnusableInput.
     """
     by_label = {entry.label: entry for entry in suite.models}
-    named = [by_label.get(name, Entry(name)) for name in models or ()] + [Entry(name) for name in files]
+    named = [by_label.get(name, Entry(name)) for name in choice.models] + [Entry(name) for name in choice.files]
     entries = []
     for entry in named or suite.models:
         try:
@@ -44,26 +54,28 @@ def choose_entries(suite: Suite, models: Sequence[str] | None, files: Sequence[s
     return entries
 
 
-def sources(datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None) -> list[Source]:
-    """Where the named data sets come from. Columns and dt go to the CSV files among them, if there are."""
+def load_arguments(
+    datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None
+) -> list[LoadArguments]:
+    """How to load the named data sets. Columns and dt go to the CSV files among them, if there are."""
     files = [name for name in datasets if Path(name).is_file()]
     return [
-        Source(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else Source(name)
+        LoadArguments(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else LoadArguments(name)
         for name in datasets
     ]
 
 
-def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple[Source, Card]]:
+def choose_data(suite: Suite, named: Sequence[LoadArguments], note: Note) -> list[tuple[LoadArguments, Card]]:
     """The data sets to run on, with their cards: those the user named, or else the suite's.
 
     One of the suite's that is not at hand is noted and left out; one the user named raises UnusableInput.
     """
     chosen = []
-    for source in named or [Source(name) for name in suite.datasets]:
+    for arguments in named or [LoadArguments(name) for name in suite.datasets]:
         try:
-            chosen.append((source, Card.of(source.load())))
+            chosen.append((arguments, Card.of(arguments.load())))
         except UnusableInput as error:
-            if named or source.data not in DATASETS:
+            if named or arguments.data not in DATASETS:
                 raise
             note(f"left out: {error}")
     names = [card.name for _, card in chosen]
@@ -75,19 +87,25 @@ def choose_data(suite: Suite, named: Sequence[Source], note: Note) -> list[tuple
 
 
 def plan(
-    suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[Source, Card]], provenance: dict[str, Any]
+    suite: Suite, entries: Sequence[Entry], data: Sequence[tuple[LoadArguments, Card]], provenance: dict[str, Any]
 ) -> list[Job]:
-    """All jobs, one data set after the other, because a worker keeps the last one it loaded.
+    """All jobs, one data set after the other.
 
     Each carries a digest of its model's code: results of the old code must not stand for the new.
     """
-    digests = {id(entry): {"model_sha256": model_sha256(entry)} for entry in entries}
+    codes = [model_code(entry) for entry in entries]
     return [
-        Job(entry, source, card, seed, suite.tasks, provenance | digests[id(entry)])
-        for source, card in data
+        Job(
+            entry, arguments, card, seed, suite.tasks, provenance | {"model_sha256": code.sha256()}, _slow_imports(code)
+        )
+        for arguments, card in data
         for seed in range(suite.seeds)
-        for entry in entries
+        for entry, code in zip(entries, codes, strict=True)
     ]
+
+
+def _slow_imports(code: Code) -> tuple[str, ...]:
+    return tuple(module for package in sorted(code.outside) for module in SLOW_IMPORTS.get(package, ()))
 
 
 def stored_rows(jobs: Sequence[Job], folder: Path, suite: Suite) -> dict[store.Key, Result]:

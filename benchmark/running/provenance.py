@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import platform
 import subprocess
 from functools import cache
@@ -24,16 +22,6 @@ def provenance(threads: int) -> dict[str, Any]:
         "threads": threads,
         "platform": f"{platform.system()} {platform.machine()}",
     }
-
-
-def source_sha256(model: type) -> str:
-    """Digest of the code that makes a model: its file and, for one of simgap's own, the machinery one level down."""
-    file = Path(inspect.getfile(model))
-    machinery = sorted(file.parent.glob("*/*.py")) if model.__module__.startswith("simgap.") else []
-    digest = hashlib.sha256()
-    for path in (file, *machinery):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -73,7 +73,8 @@ class _Reader:
     table: dict[str, Any]
 
     def suite(self) -> Suite:
-        self._refuse_unknown(self.table, ("title", "datasets", "models", "tasks", "seeds", "timeout", "memory"))
+        known = ("title", "datasets", "models", "groups", "tasks", "seeds", "timeout", "memory")
+        self._refuse_unknown(self.table, known)
         suite = Suite(
             name=self.path.stem,
             title=self._get("title", str, self.path.stem),
@@ -107,7 +108,7 @@ class _Reader:
             raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
         usual: dict[str, Entry] = {}
         chosen: list[Entry] = []
-        for table in tables:
+        for table in self._without_groups(tables):
             self._refuse_unknown(table, ("name", "params", "label", "gpus"))
             entry: tuple[Any, ...] = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
             if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
@@ -119,6 +120,36 @@ class _Reader:
                 chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table)))
         labels = {entry.label for entry in chosen}
         return [*(entry for label, entry in usual.items() if label not in labels), *chosen]
+
+    def _without_groups(self, tables: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """The tables, where each that has a `group` stands for one table per name of it."""
+        groups = self._groups()
+        for table in tables:
+            if "group" not in table:
+                yield table
+                continue
+            if "name" in table:
+                raise UnusableInput(f"{self.path}: a model has a name or a group, not both")
+            group, label = table["group"], table.get("label", "{name}")
+            if not isinstance(group, str) or group not in groups:
+                known = ", ".join(groups) or "none; name some under [groups]"
+                raise UnusableInput(f"{self.path}: there is no group {group!r}; known are {known}")
+            if not isinstance(label, str) or "{name}" not in label:
+                raise UnusableInput(f"{self.path}: the label {label!r} of a group needs {{name}} in it")
+            for name in groups[group]:
+                own = label.replace("{name}", name.rpartition(":")[2])
+                yield {key: value for key, value in table.items() if key != "group"} | {"name": name, "label": own}
+
+    def _groups(self) -> dict[str, list[str]]:
+        groups = self.table.get("groups", {})
+        if not isinstance(groups, dict):
+            raise UnusableInput(f"{self.path}: groups must be a table of lists of names, headed [groups]")
+        for name, members in groups.items():
+            if not isinstance(members, list) or not members or not all(isinstance(m, str) and m for m in members):
+                raise UnusableInput(f"{self.path}: the group {name} must be a list of names of models")
+            if "all" in members:
+                raise UnusableInput(f"{self.path}: the group {name} cannot hold all; give all a table of its own")
+        return groups
 
     def _gpus(self, table: dict[str, Any]) -> float:
         gpus = table.get("gpus", 0.0)

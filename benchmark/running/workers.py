@@ -53,15 +53,27 @@ def threads_per_worker(workers: int) -> int:
 def limit_threads(threads: int) -> None:
     """Set the limit of the numerical libraries, of those that will be loaded and of those that are there already."""
     os.environ.update(dict.fromkeys(_VARIABLES, str(threads)))
-    if "numpy" in sys.modules:
-        from threadpoolctl import threadpool_limits
-
-        threadpool_limits(threads)
     if (torch := sys.modules.get("torch")) is not None:
         torch.set_num_threads(threads)
     if (numba := sys.modules.get("numba")) is not None:
         numba.config.reload_config()  # reads the variable, as every compilation does, which refuses another number
-        numba.set_num_threads(threads)
+        numba.set_num_threads(threads)  # which starts OpenMP with a thread per core
+    if "numpy" in sys.modules:
+        from threadpoolctl import threadpool_limits
+
+        threadpool_limits(threads)
+
+
+def threads_in_force() -> int:
+    """The most threads that a numerical library of this process uses, as it says itself."""
+    from threadpoolctl import threadpool_info
+
+    counts = [library["num_threads"] for library in threadpool_info()]
+    if (torch := sys.modules.get("torch")) is not None:
+        counts.append(torch.get_num_threads())
+    if (numba := sys.modules.get("numba")) is not None:
+        counts.append(numba.get_num_threads())
+    return max(counts, default=1)
 
 
 def limit_memory(gib: float) -> None:

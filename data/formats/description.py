@@ -31,7 +31,7 @@ class Description:
 
 
 def read_description(file: Path) -> Description:
-    """The description in `file`. Raises UnusableInput that names the line or the key that is wrong."""
+    """Read a dataset.toml. Raises UnusableInput that names the line or the key that is wrong."""
     content = _parse(file)
     _check_keys(content, KEYS, str(file), required=("name", "sampling_time", "inputs", "outputs", "splits"))
     dt, n_init = content["sampling_time"], content.get("n_init")
@@ -51,12 +51,12 @@ def read_description(file: Path) -> Description:
 
 
 def columns_of(channels: Channels) -> tuple[str, ...]:
-    """The names of all inputs, then of all outputs."""
+    """List the names of all inputs, then of all outputs."""
     return tuple(channel.name for channel in channels.inputs + channels.outputs)
 
 
 def check_columns(columns: tuple[str, ...], source: str) -> None:
-    """Raises UnusableInput unless each name can stand in a header line and none is used twice."""
+    """Raise UnusableInput unless each name can stand in a header line and none is used twice."""
     for column in columns:
         if not column or not column.isprintable() or column != column.strip():
             raise UnusableInput(

@@ -5,17 +5,15 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-import numpy as np
-
+from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import FILE, Description, read_description
 from simgap.data.formats.sampling import check_time
-from simgap.data.formats.tables import Table, read_csv
 from simgap.data.splits import assemble, hold_out_tails
-from simgap.records import Channels, Dataset, Experiment, UnusableInput
+from simgap.records import Dataset, Experiment, UnusableInput
 
 
 def load_folder(folder: Path) -> Dataset:
-    """The data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
+    """Read the data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
     described = read_description(folder / FILE)
     files = {split: _matching(folder, split, pattern) for split, pattern in described.splits.items()}
     names = _experiment_names(folder, files)
@@ -31,15 +29,8 @@ def load_folder(folder: Path) -> Dataset:
     return assemble(described.name, splits, described.channels, described.n_init, str(folder))
 
 
-def experiment_of(table: Table, name: str, channels: Channels, dt: float) -> Experiment:
-    """The table's input and output columns as one experiment, sampled every dt seconds."""
-    u = np.column_stack([table.numbers(channel.name) for channel in channels.inputs])  # [T, nu]
-    y = np.column_stack([table.numbers(channel.name) for channel in channels.outputs])  # [T, ny]
-    return Experiment(name, u, y, dt)
-
-
 def natural_order(name: str) -> tuple[list[str | int], str]:
-    """Sort key that puts "run_10" after "run_9"; no two names share a key."""
+    """Make a sort key that puts "run_10" after "run_9"; no two names share a key."""
     return [int(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+)", name))], name
 
 
@@ -47,11 +38,11 @@ def _experiment(file: Path, name: str, described: Description) -> Experiment:
     table = read_csv(file)
     if described.time is not None:
         check_time(table, described.time, described.sampling_time)
-    return experiment_of(table, name, described.channels, described.sampling_time)
+    return table.experiment(name, described.channels, described.sampling_time)
 
 
 def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
-    """The files of a split in natural order. Raises UnusableInput for none and for one outside the folder."""
+    """Find the files of a split, in natural order. Raises UnusableInput for none and for one outside the folder."""
     where = f"{folder / FILE}: splits.{split} = {pattern!r}"
     for flavour in (PurePosixPath(pattern), PureWindowsPath(pattern)):
         if flavour.anchor or ".." in flavour.parts or not flavour.parts:
@@ -72,7 +63,7 @@ def _matching(folder: Path, split: str, pattern: str) -> list[Path]:
 
 
 def _experiment_names(folder: Path, files: dict[str, list[Path]]) -> dict[Path, str]:
-    """File -> experiment name: the bare file name where that is unique, else more of the path."""
+    """Name the experiment of each file: the bare file name where that is unique, else more of the path."""
     every = [file for found in files.values() for file in found]
     seen: set[Path] = set()
     for file in every:

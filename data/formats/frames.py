@@ -14,7 +14,7 @@ from simgap.records import UnusableInput
 
 
 def table_of(frame: Any) -> Table:
-    """The frame's columns by name. Raises UnusableInput for anything but a DataFrame with rows."""
+    """Make a table of a DataFrame's columns. Raises UnusableInput for anything but a DataFrame with rows."""
     if not isinstance(frame, pd.DataFrame):
         raise UnusableInput(
             f"a data set cannot be made from {type(frame).__name__}; "

@@ -13,7 +13,7 @@ DRIFT_TOLERANCE = 0.01  # of dt, for the mean step
 
 
 def check_time(table: Table, column: str, dt: float) -> None:
-    """Raises UnusableInput unless every step is dt to 10 % and the mean step is dt to 1 %."""
+    """Raise UnusableInput unless every step is dt to 10 % and the mean step is dt to 1 %."""
     t = table.numbers(column)
     if len(t) < 2:
         return
@@ -25,7 +25,7 @@ def check_time(table: Table, column: str, dt: float) -> None:
 
 
 def sampling_time(table: Table, column: str) -> float:
-    """Sampling time in seconds: the mean step to 12 digits. Raises UnusableInput when time is uneven."""
+    """Take the mean step of the time column, s, to 12 digits. Raises UnusableInput when time is uneven."""
     t = table.numbers(column)
     if len(t) < 2:
         raise UnusableInput(f"{table.source}: one row has no time step; add samples or give dt")

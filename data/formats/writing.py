@@ -45,7 +45,7 @@ def _make_empty(folder: Path) -> None:
 
 
 def _stems(experiments: tuple[Experiment, ...]) -> list[str]:
-    """File names without ending, from the experiments' names, numbered where those do not keep the order."""
+    """Make file names without ending of the experiments' names, numbered where those do not keep the order."""
     stems = [re.sub(r"[^\w.\-]", "_", experiment.name)[:80].strip(".") for experiment in experiments]
     keys = [natural_order(stem) for stem in stems]
     unique = len({stem.casefold() for stem in stems}) == len(stems)
@@ -81,5 +81,5 @@ def _toml(dataset: Dataset, time: str | None) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A TOML basic string; JSON escapes the same way."""
+    """Write a TOML basic string; JSON escapes the same way."""
     return json.dumps(text, ensure_ascii=False)

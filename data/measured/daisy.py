@@ -34,7 +34,7 @@ def _download(address: str, stem: str, folder: Path) -> None:
 
 
 def _columns(folder: Path, stem: str, count: int) -> Float[np.ndarray, "T columns"]:
-    """The table in stem.mat, or in stem.dat as DaISy hands it out."""
+    """Read the table in stem.mat, or in stem.dat as DaISy hands it out."""
     if (folder / f"{stem}.mat").is_file():
         from scipy.io import loadmat
 

@@ -15,7 +15,7 @@ from simgap.registry import DATASETS
 
 
 def available() -> dict[str, str]:
-    """Every registered data set -> "" when it is at hand, else one sentence why not and how to get it.
+    """Map every registered data set to "" when it is at hand, else to one sentence why not and how to get it.
 
     Looks only at whether files exist; reads none.
     """
@@ -23,7 +23,7 @@ def available() -> dict[str, str]:
 
 
 def card(name: str) -> str:
-    """The card of a registered data set: title in the first line, then machine, channels, source, licence."""
+    """Give the card of a registered data set: its title, then machine, channels, source, licence."""
     return inspect.getdoc(DATASETS[name]) or name
 
 

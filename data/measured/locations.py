@@ -33,7 +33,7 @@ class Source:
     build: Callable[[Path], Dataset]
 
     def folder(self) -> Path | None:
-        """The first folder that holds all files, or None."""
+        """Find the first folder that holds all files; None without one."""
         for root in roots():
             for folder in (root / self.collection, root):
                 if self.complete(folder):
@@ -41,17 +41,17 @@ class Source:
         return None
 
     def complete(self, folder: Path) -> bool:
-        """Whether each pattern matches a file below the folder."""
+        """Tell whether each pattern matches a file below the folder."""
         return all(any(file.is_file() for file in folder.glob(pattern)) for pattern in self.patterns)
 
     def why_missing(self) -> str:
-        """Empty when the files are at hand, else one sentence that says how to get them."""
+        """Say how to get the files in one sentence; empty when they are at hand."""
         if self.folder() is not None:
             return ""
         return f"{self.name} is not at hand; get it with `simgap data fetch {self.name}`"
 
     def read(self, folder: Path) -> Dataset:
-        """The data set in the files of `folder`. Raises UnusableInput when they are broken."""
+        """Read the data set in the files of `folder`. Raises UnusableInput when they are broken."""
         try:
             return self.build(folder)
         except UnusableInput:
@@ -89,7 +89,7 @@ def reads(
 
 
 def roots() -> list[Path]:
-    """Folders that may hold measured data, in the order in which they are searched."""
+    """List the folders that may hold measured data, in the order in which they are searched."""
     checkout = Path(__file__).resolve().parents[2]
     shared = [Path.cwd().parent / "shared" / "data", checkout.parent / "shared" / "data"]
     own = [Path(os.environ["SIMGAP_DATA"])] if os.environ.get("SIMGAP_DATA") else []
@@ -97,10 +97,10 @@ def roots() -> list[Path]:
 
 
 def cache() -> Path:
-    """The user's cache folder, where `simgap data fetch` puts files."""
+    """Find the user's cache folder, where `simgap data fetch` puts files."""
     return Path(platformdirs.user_cache_dir("simgap"))
 
 
 def one_line(error: BaseException) -> str:
-    """The text of an error on one line, or the name of its type when it has none."""
+    """Put the text of an error on one line, or the name of its type when it has none."""
     return " ".join(str(error).split()) or type(error).__name__

@@ -26,12 +26,12 @@ def _package(benchmark: str) -> Callable[..., Any]:
 
 
 def _download(benchmark: str, folder: Path) -> None:
-    """Let the package fill `folder`, which is created by nobody else."""
+    """Let the package download its files into `folder`."""
     _package(benchmark)(dir_placement=folder, data_file_locations=True)
 
 
 def _official(benchmark: str, folder: Path) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """The package's training and test records. All files must be there, or the package would download."""
+    """Read the package's training and test records. All files must be there, or the package would download."""
     train, test = _package(benchmark)(dir_placement=folder, atleast_2d=True, always_return_tuples_of_datasets=True)
     return tuple(train), tuple(test)
 
@@ -49,7 +49,7 @@ def _experiments(records: dict[str, Any]) -> list[Experiment]:
 
 
 def _named(names: Sequence[str], records: tuple[Any, ...]) -> dict[str, Any]:
-    """By position, because slices of the package's records lose their names."""
+    """Name records by their position, because slices of the package's records lose their names."""
     return dict(zip(names, records, strict=True))
 
 

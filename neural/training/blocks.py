@@ -17,11 +17,11 @@ class Block(nn.Module):
     """A causal part: `forward` gives the features at all samples, `last` those at the last one."""
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Features at all samples; those at sample k depend on nothing after k."""
+        """Compute the features at all samples; those at sample k depend on nothing after k."""
         raise NotImplementedError
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Features at the last sample."""
+        """Compute the features at the last sample."""
         raise NotImplementedError
 
 
@@ -33,13 +33,13 @@ class Recurrences(Block):
         self.layers: Any = nn.ModuleList(layers)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """States of the uppermost layer."""
+        """Compute the states of the uppermost layer."""
         for layer in self.layers:
             x = layer.states(x)
         return x
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Last state of the uppermost layer."""
+        """Compute the last state of the uppermost layer."""
         *lower, upper = self.layers
         for layer in lower:
             x = layer.states(x)
@@ -61,7 +61,7 @@ class Pooled(Block):
         nn.init.xavier_uniform_(self.full.weight.data.flatten(1))  # as the fully connected layer that it is
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Features of the window that ends at each sample; before the start there are zeros."""
+        """Compute the features of the window that ends at each sample; before the start there are zeros."""
         x = self.first.over(x)
         x = (x + _before(x, 1)) / 2
         x = self.second.over(x, 2)
@@ -69,7 +69,7 @@ class Pooled(Block):
         return self.full.over(x, 4)
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Features of the window, of which a remainder of fewer than four samples is left out at its start."""
+        """Compute the features of the window; a remainder of fewer than four samples is left out at its start."""
         return pooled(x[:, x.shape[1] % 4 :], self.first, self.second, self.full)
 
 
@@ -82,16 +82,16 @@ class Tcn(Block):
         self.blocks: Any = nn.ModuleList(Residual(size, channels, kernel, dropout) for size in sizes)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Features at all samples; before the start there are zeros."""
+        """Compute the features at all samples; before the start there are zeros."""
         for level, block in enumerate(self.blocks):
             x = block.over(x, 2**level)
         return x
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """The same at the last sample.
+        """Compute the features at the last sample.
 
-        A block of dilation d is asked for every d-th sample by the next one, counted from the end, and the uppermost
-        for one. What it is not asked for is not computed, and what is left of a sequence is one of dilation 1.
+        The next block reads only every d-th sample of one of dilation d, counted from the end, and of the uppermost one
+        counts. The others are not computed, and in the subsampled sequence every dilation is 1.
         """
         *lower, upper = self.blocks
         for block in lower:
@@ -100,7 +100,7 @@ class Tcn(Block):
 
 
 def _before(x: Float[Tensor, "B T F"], samples: int) -> Float[Tensor, "B T F"]:
-    """The signal so many samples earlier, zero before its start."""
+    """Delay the signal by so many samples, with zeros before its start."""
     return nn.functional.pad(x, (0, 0, samples, 0))[:, : x.shape[1]]
 
 
@@ -112,11 +112,11 @@ class Headed(Block):
         self.body, self.head = body, full(features, outputs)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Outputs at all samples."""
+        """Compute the outputs at all samples."""
         return self.head(self.body(x))
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Outputs at the last sample."""
+        """Compute the outputs at the last sample."""
         return self.head(self.body.last(x))
 
 
@@ -133,11 +133,11 @@ class Parallel(Block):
         self.narrow, self.wide = full(features, hidden), full(hidden, features)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Features at all samples."""
+        """Compute the features at all samples."""
         return self._joined(torch.cat([block(x) for block in self.blocks], dim=2))
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Features at the last sample."""
+        """Compute the features at the last sample."""
         return self._joined(torch.cat([block.last(x) for block in self.blocks], dim=1))
 
     def _joined(self, z: Tensor) -> Tensor:

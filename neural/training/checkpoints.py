@@ -27,21 +27,21 @@ class Checkpoint:
     history: dict[str, list[float]]
 
     def save(self) -> None:
-        """Write all of it; a reader sees the old file or the new one. A full disk does not end a training."""
+        """Write the state; a reader sees the old file or the new one. A full disk does not end a training."""
         if self.path is None:
             return
-        told = {"history": json.dumps(self.history), "rate": repr(self.adam.param_groups[0]["lr"])}
+        metadata = {"history": json.dumps(self.history), "rate": repr(self.adam.param_groups[0]["lr"])}
         partial = self.path.with_name(f"{self.path.name}.{os.getpid()}")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            save_file({name: value.contiguous() for name, value in self._tensors().items()}, partial, told)
+            save_file({name: value.contiguous() for name, value in self._tensors().items()}, partial, metadata)
             partial.replace(self.path)
         except (OSError, SafetensorError):
             with contextlib.suppress(OSError):
                 partial.unlink()
 
     def restore(self) -> bool:
-        """Whether there was such a file; one that is torn or does not fit is left alone and training starts anew."""
+        """Read the state if there is one, and return whether; a torn file, or another network's, is ignored."""
         if self.path is None or not self.path.is_file():
             return False
         for p in self.net.parameters():  # Adam makes its moments at its first step
@@ -50,8 +50,8 @@ class Checkpoint:
         mine = self._tensors()
         try:
             with safe_open(self.path, "pt") as file:
-                told = file.metadata()
-                history, rate = json.loads(told["history"]), float(told["rate"])
+                metadata = file.metadata()
+                history, rate = json.loads(metadata["history"]), float(metadata["rate"])
                 theirs = {name: file.get_tensor(name) for name in mine}
             if any(theirs[name].shape != value.shape for name, value in mine.items()):
                 raise ValueError("of another network")
@@ -85,7 +85,7 @@ class Checkpoint:
 
 
 def remove(path: Path) -> None:
-    """The training is over; what a killed one left half written goes too."""
+    """Delete the checkpoint of a finished training, and what a killed one left half written."""
     with contextlib.suppress(OSError):
         for file in path.parent.glob(f"{path.name}*"):
             file.unlink(missing_ok=True)

@@ -34,51 +34,51 @@ class _Pass(torch.autograd.Function):
 class _Pooled(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, *weights: Tensor) -> Tensor:
-        given = [value.detach().numpy() for value in weights]
+        arrays = [value.detach().numpy() for value in weights]
         values = x.detach().numpy()
         batch, steps, _ = values.shape
-        outputs = [len(w) for w in given[::2]]
+        outputs = [len(w) for w in arrays[::2]]
         sizes = ((steps, outputs[0]), (steps // 2, outputs[0]), (steps // 2, outputs[1]), (steps // 4, outputs[1]),
                  (1, outputs[2]))  # fmt: skip
-        held = [np.empty((batch, *size), values.dtype) for size in sizes]
-        kernels.run_pooled(values, *given, *held)
-        ctx.rest = values, given, held
-        return torch.from_numpy(held[-1])
+        activations = [np.empty((batch, *size), values.dtype) for size in sizes]
+        kernels.run_pooled(values, *arrays, *activations)
+        ctx.rest = values, arrays, activations
+        return torch.from_numpy(activations[-1])
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        x, given, held = ctx.rest
-        found = [np.empty_like(value) for value in given]
+        x, arrays, activations = ctx.rest
+        gradients = [np.empty_like(value) for value in arrays]
         dx = _like(x, ctx.needs_input_grad[0])
-        kernels.back_pooled(x, *given[::2], *held, grads[0].contiguous().numpy(), *found, dx)
-        return (_tensor(dx), *map(torch.from_numpy, found))
+        kernels.back_pooled(x, *arrays[::2], *activations, grads[0].contiguous().numpy(), *gradients, dx)
+        return (_tensor(dx), *map(torch.from_numpy, gradients))
 
 
 class _Residual(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor, step: int, dilation: int, *weights: Tensor) -> Tensor:
-        given = [value.detach().numpy() for value in weights]
+        arrays = [value.detach().numpy() for value in weights]
         values = x.detach().numpy()
         batch, length, channels = values.shape
-        outputs, answers = len(given[0]), -(-length // step)
+        outputs, answers = len(arrays[0]), -(-length // step)
         sizes = (length, outputs), (answers, outputs), (answers, channels), (answers, outputs)
-        held = [np.empty((batch, *size), values.dtype) for size in sizes]
-        kernels.run_block(values, step, *given, dilation, *held)
-        ctx.rest = values, given, held, step, dilation
-        return torch.from_numpy(held[-1])
+        activations = [np.empty((batch, *size), values.dtype) for size in sizes]
+        kernels.run_block(values, step, *arrays, dilation, *activations)
+        ctx.rest = values, arrays, activations, step, dilation
+        return torch.from_numpy(activations[-1])
 
     @staticmethod
     def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor | None, ...]:
-        x, given, held, step, dilation = ctx.rest
-        w1, _, w2, _, skip, _ = given
-        found = [np.empty_like(value) for value in given]
+        x, arrays, activations, step, dilation = ctx.rest
+        w1, _, w2, _, skip, _ = arrays
+        gradients = [np.empty_like(value) for value in arrays]
         dx = _like(x, ctx.needs_input_grad[0])
-        kernels.back_block(x, step, w1, w2, skip, dilation, *held, grads[0].contiguous().numpy(), *found, dx)
-        return (_tensor(dx), None, None, *map(torch.from_numpy, found))
+        kernels.back_block(x, step, w1, w2, skip, dilation, *activations, grads[0].contiguous().numpy(), *gradients, dx)
+        return (_tensor(dx), None, None, *map(torch.from_numpy, gradients))
 
 
 def _like(x: np.ndarray, wanted: bool) -> np.ndarray:
-    """Room for the gradient of x; without samples if nobody wants it."""
+    """Allocate the gradient of x; without samples if nobody wants it."""
     return np.empty_like(x if wanted else x[:, :0])
 
 
@@ -99,7 +99,7 @@ class Residual(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def over(self, x: Float[Tensor, "B T F"], dilation: int = 1, step: int = 1) -> Float[Tensor, "B S G"]:
-        """The block over a sequence, at every `step`-th sample counted from the end."""
+        """Run the block over a sequence, at every `step`-th sample counted from the end."""
         if x.device.type == "cpu" and not (self.training and self.dropout.p):
             weights = [self.one.weight, self.one.bias, self.two.weight, self.two.bias]
             if self.through is None:
@@ -114,7 +114,7 @@ class Residual(nn.Module):
 
 
 def full(inputs: int, outputs: int) -> nn.Linear:
-    """A fully connected layer with the initial weights of Keras: Glorot uniform, offsets zero."""
+    """Make a fully connected layer with the initial weights of Keras: Glorot uniform, offsets zero."""
     layer = nn.Linear(inputs, outputs)
     nn.init.xavier_uniform_(layer.weight)
     nn.init.zeros_(layer.bias)
@@ -131,7 +131,7 @@ class Convolution(nn.Conv1d):
         nn.init.zeros_(self.bias)
 
     def over(self, x: Float[Tensor, "B T F"], dilation: int = 1, step: int = 1) -> Float[Tensor, "B S G"]:
-        """The convolution of a sequence, at every `step`-th sample counted from the end."""
+        """Convolve a sequence, at every `step`-th sample counted from the end."""
         if x.device.type == "cpu":
             return _Pass.apply(x.contiguous(), self.weight, self.bias, dilation, step)  # type: ignore[no-any-return]
         padded = nn.functional.pad(x.transpose(1, 2), ((self.kernel_size[0] - 1) * dilation, 0))
@@ -142,7 +142,7 @@ class Convolution(nn.Conv1d):
 def pooled(
     x: Float[Tensor, "B T F"], first: Convolution, second: Convolution, last: Convolution
 ) -> Float[Tensor, "B G"]:
-    """Two convolutions, each followed by the mean of each two samples, and a third one at the last sample.
+    """Convolve twice, each time averaging pairs of samples, then a third time at the last sample.
 
     The length has to be a multiple of four.
     """

@@ -1,4 +1,4 @@
-"""Causal convolutions over time with ReLU, compiled: shifted samples side by side, one product, one bend.
+"""Causal convolutions over time with ReLU, compiled: im2col, matrix product, ReLU.
 
 Arrays are x [B, T, C], weights [G, C, K] as in PyTorch, y [B, S, G] with every `step`-th sample counted from the end;
 tap K-1 meets the newest sample.
@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-# Numbers in a matrix of shifted samples: a larger one is made piece by piece, because it would not fit into the cache.
+# Numbers in an im2col matrix: a larger one is made piece by piece, because it would not fit into the cache.
 AT_ONCE = 1 << 17
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _by_taps(weight):
-    """Weights [G, C, K] as a matrix [G, K C]."""
+    """Reorder weights [G, C, K] to a matrix [G, K C]."""
     outputs, channels, taps = weight.shape
     flat = np.empty((outputs, taps * channels), weight.dtype)
     for g in range(outputs):
@@ -26,14 +26,14 @@ def _by_taps(weight):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _records(answers, columns):
-    """How many records are taken at once."""
+def _batch_size(answers, columns):
+    """Count the sequences whose im2col matrix is made at once."""
     return max(1, AT_ONCE // (answers * columns))
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _shift(x, begin, end, dilation, step, answers, columns):
-    """The samples that meet the taps, side by side, of the records from `begin` to `end`."""
+def _im2col(x, begin, end, dilation, step, answers, columns):
+    """Fill `columns` with the samples under the taps for each output sample, of the sequences from `begin` to `end`."""
     steps, channels = x.shape[1:]
     taps = columns.shape[1] // channels
     first = steps - 1 - (answers - 1) * step - (taps - 1) * dilation
@@ -57,8 +57,8 @@ def _shift(x, begin, end, dilation, step, answers, columns):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _unshift(columns, begin, end, dilation, step, answers, x):
-    """The sum of what was taken from every sample of those records, added to x."""
+def _col2im(columns, begin, end, dilation, step, answers, x):
+    """Add every entry of `columns` to the sample of x that `_im2col` copied it from."""
     steps, channels = x.shape[1:]
     taps = columns.shape[1] // channels
     first = steps - 1 - (answers - 1) * step - (taps - 1) * dilation
@@ -80,15 +80,15 @@ def _unshift(columns, begin, end, dilation, step, answers, x):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def run_conv(x, weight, offset, dilation, step, y):
-    """y(k) = ReLU(offset + sum over j of W_j x(k - (K-1-j) dilation)), zeros before the start."""
+    """Compute y(k) = ReLU(offset + sum over j of W_j x(k - (K-1-j) dilation)), zeros before the start."""
     batch, answers, outputs = y.shape
     flat = np.ascontiguousarray(_by_taps(weight).T)
     values = y.reshape(batch * answers, outputs)
-    at_once = _records(answers, flat.shape[0])
+    at_once = _batch_size(answers, flat.shape[0])
     columns = np.empty((min(batch, at_once) * answers, flat.shape[0]), x.dtype)
     for begin in range(0, batch, at_once):
         end = min(batch, begin + at_once)
-        _shift(x, begin, end, dilation, step, answers, columns)
+        _im2col(x, begin, end, dilation, step, answers, columns)
         np.dot(columns[: (end - begin) * answers], flat, values[begin * answers : end * answers])
     for row in range(batch * answers):
         for g in range(outputs):
@@ -97,12 +97,12 @@ def run_conv(x, weight, offset, dilation, step, y):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def back_conv(x, weight, y, dy, dilation, step, d_weight, d_offset, dx):
-    """Gradients of the weights, of the offset and, where dx has samples, of x."""
+    """Compute the gradients of the weights, of the offset and, where dx has samples, of x."""
     batch, answers, outputs = y.shape
     _, channels, taps = weight.shape
     flat = _by_taps(weight)
     of_columns = np.zeros((outputs, taps * channels), y.dtype)
-    at_once = _records(answers, taps * channels)
+    at_once = _batch_size(answers, taps * channels)
     columns = np.empty((min(batch, at_once) * answers, taps * channels), y.dtype)
     d = np.empty((min(batch, at_once) * answers, outputs), y.dtype)
     d_offset[:] = 0
@@ -116,11 +116,11 @@ def back_conv(x, weight, y, dy, dilation, step, d_weight, d_offset, dx):
                 for g in range(outputs):
                     row[g] = dy[b, s, g] if y[b, s, g] > 0 else 0
                     d_offset[g] += row[g]
-        _shift(x, begin, end, dilation, step, answers, columns)
+        _im2col(x, begin, end, dilation, step, answers, columns)
         of_columns += np.dot(d[:rows].T, columns[:rows])
         if dx.shape[1] > 0:
             np.dot(d[:rows], flat, columns[:rows])
-            _unshift(columns, begin, end, dilation, step, answers, dx)
+            _col2im(columns, begin, end, dilation, step, answers, dx)
     for g in range(outputs):
         for c in range(channels):
             for j in range(taps):
@@ -128,10 +128,10 @@ def back_conv(x, weight, y, dy, dilation, step, d_weight, d_offset, dx):
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, y1, y2, kept, y):
-    """y = ReLU(conv(conv(x)) + skip x) at every `step`-th sample counted from the end; an empty `skip` is the identity.
+def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, y1, y2, skipped, y):
+    """Compute y = ReLU(conv(conv(x)) + skip x) at every `step`-th sample from the end; an empty `skip` is the identity.
 
-    The samples of x that are skipped to are left in `kept`.
+    The samples of x that enter by the skip connection are stored in `skipped`.
     """
     batch, answers, outputs = y.shape
     channels = x.shape[2]
@@ -139,27 +139,27 @@ def run_block(x, step, w1, o1, w2, o2, skip, skip_offset, dilation, y1, y2, kept
     for b in range(batch):
         for s in range(answers):
             for c in range(channels):
-                kept[b, s, c] = x[b, first + s * step, c]
+                skipped[b, s, c] = x[b, first + s * step, c]
     run_conv(x, w1, o1, dilation, 1, y1)
     run_conv(y1, w2, o2, dilation, step, y2)
     if skip.shape[0]:
-        around = np.dot(kept.reshape(batch * answers, channels), skip.T).reshape(y.shape)
+        through_skip = np.dot(skipped.reshape(batch * answers, channels), skip.T).reshape(y.shape)
         for b in range(batch):
             for s in range(answers):
                 for g in range(outputs):
-                    y[b, s, g] = max(y2[b, s, g] + around[b, s, g] + skip_offset[g], 0)
+                    y[b, s, g] = max(y2[b, s, g] + through_skip[b, s, g] + skip_offset[g], 0)
     else:
         for b in range(batch):
             for s in range(answers):
                 for g in range(outputs):
-                    y[b, s, g] = max(y2[b, s, g] + kept[b, s, g], 0)
+                    y[b, s, g] = max(y2[b, s, g] + skipped[b, s, g], 0)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def back_block(x, step, w1, w2, skip, dilation, y1, y2, kept, y, dy, dw1, do1, dw2, do2, d_skip, do_skip, dx):
-    """Backward pass of `run_block`; without samples in dx its gradient is left out."""
+def back_block(x, step, w1, w2, skip, dilation, y1, y2, skipped, y, dy, dw1, do1, dw2, do2, d_skip, do_skip, dx):
+    """Run `run_block` backwards; without samples in dx its gradient is left out."""
     batch, answers, outputs = y.shape
-    channels = kept.shape[2]
+    channels = skipped.shape[2]
     d, dy1 = np.empty_like(y), np.empty_like(y1)
     for b in range(batch):
         for s in range(answers):
@@ -169,23 +169,23 @@ def back_block(x, step, w1, w2, skip, dilation, y1, y2, kept, y, dy, dw1, do1, d
     back_conv(x, w1, y1, dy1, dilation, 1, dw1, do1, dx)
     flat = d.reshape(batch * answers, outputs)
     if skip.shape[0]:
-        d_skip[:] = np.dot(flat.T, kept.reshape(batch * answers, channels))
+        d_skip[:] = np.dot(flat.T, skipped.reshape(batch * answers, channels))
         do_skip[:] = 0
         for row in range(batch * answers):
             for g in range(outputs):
                 do_skip[g] += flat[row, g]
     if dx.shape[1] > 0:
-        around = np.dot(flat, skip).reshape(kept.shape) if skip.shape[0] else d
+        through_skip = np.dot(flat, skip).reshape(skipped.shape) if skip.shape[0] else d
         first = dx.shape[1] - 1 - (answers - 1) * step
         for b in range(batch):
             for s in range(answers):
                 for c in range(channels):
-                    dx[b, first + s * step, c] += around[b, s, c]
+                    dx[b, first + s * step, c] += through_skip[b, s, c]
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _halve(y, mean):
-    """The means of each two samples."""
+    """Average each two samples."""
     for b in range(mean.shape[0]):
         for t in range(mean.shape[1]):
             for g in range(mean.shape[2]):
@@ -194,7 +194,7 @@ def _halve(y, mean):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _double(d_mean, dy):
-    """Backward pass of `_halve`."""
+    """Run `_halve` backwards."""
     for b in range(d_mean.shape[0]):
         for t in range(d_mean.shape[1]):
             for g in range(d_mean.shape[2]):
@@ -203,7 +203,7 @@ def _double(d_mean, dy):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def run_pooled(x, w1, o1, w2, o2, w3, o3, y1, mean1, y2, mean2, y3):
-    """Two convolutions, each followed by the mean of each two samples, and a third one at the last sample."""
+    """Convolve twice, each time averaging pairs of samples, then a third time at the last sample."""
     run_conv(x, w1, o1, 1, 1, y1)
     _halve(y1, mean1)
     run_conv(mean1, w2, o2, 1, 1, y2)
@@ -213,7 +213,7 @@ def run_pooled(x, w1, o1, w2, o2, w3, o3, y1, mean1, y2, mean2, y3):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def back_pooled(x, w1, w2, w3, y1, mean1, y2, mean2, y3, dy3, dw1, do1, dw2, do2, dw3, do3, dx):
-    """Backward pass of `run_pooled`; without samples in dx its gradient is left out."""
+    """Run `run_pooled` backwards; without samples in dx its gradient is left out."""
     d_mean1, d_mean2 = np.empty_like(mean1), np.empty_like(mean2)
     dy1, dy2 = np.empty_like(y1), np.empty_like(y2)
     back_conv(mean2, w3, y3, dy3, 1, mean2.shape[1], dw3, do3, d_mean2)

@@ -18,8 +18,8 @@ class Examples(ABC):
 
     @abstractmethod
     def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Tensor, Tensor]:
-        """Features and targets of the chosen ones."""
+        """Give features and targets of the chosen examples."""
 
     @abstractmethod
     def answer(self, net: Block, x: Tensor) -> Tensor:
-        """What the network says to the features."""
+        """Compute the network's outputs for the features."""

@@ -62,14 +62,14 @@ class History:
 
 
 def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
-    """Adam, whose weight decay is 2 l2: the gradient of l2 w^2."""
-    punished = {
+    """Make Adam with weight decay 2 l2, the gradient of l2 w^2, on input and convolution weights."""
+    decayed = {
         id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d)
         for name, p in m.named_parameters() if not name.startswith("weight_hh")
     }  # fmt: skip
     groups = [
-        {"params": [p for p in net.parameters() if id(p) in punished], "weight_decay": 2 * recipe.l2},
-        {"params": [p for p in net.parameters() if id(p) not in punished]},
+        {"params": [p for p in net.parameters() if id(p) in decayed], "weight_decay": 2 * recipe.l2},
+        {"params": [p for p in net.parameters() if id(p) not in decayed]},
     ]
     return torch.optim.Adam([g for g in groups if g["params"]], lr=recipe.learning_rate, fused=True)
 
@@ -121,14 +121,14 @@ def train(
 
 
 def _shuffled(examples: int, recipe: Recipe, order: torch.Generator) -> tuple[Tensor, ...]:
-    """The batches of an epoch: all examples, or as many as the recipe says, again from the start if there are fewer."""
+    """Draw the batches of an epoch: all examples once, or as many as the recipe says in repeated rounds."""
     wanted = recipe.batches * recipe.batch or examples
     rounds = [torch.randperm(examples, generator=order) for _ in range(-(-wanted // examples))]
     return torch.cat(rounds)[:wanted].split(recipe.batch)
 
 
 def error(net: Block, examples: Examples, device: str = "cpu") -> float:
-    """Mean square of the errors on scaled data, without dropout."""
+    """Compute the mean square error on scaled data, without dropout."""
     return float(
         torch.cat(
             [(answer - y).square().flatten() for answer, y in _answers(net, examples, AFTER_AN_EPOCH, device)]
@@ -137,7 +137,7 @@ def error(net: Block, examples: Examples, device: str = "cpu") -> float:
 
 
 def figures(net: Block, examples: Examples) -> dict[str, float]:
-    """MSE, MAE and R2 on scaled data; R2 is the mean over the outputs, as in scikit-learn and Keras."""
+    """Compute MSE, MAE and R2 on scaled data; R2 is the mean over the outputs, as in scikit-learn and Keras."""
     answers, targets = zip(*_answers(net, examples, AT_THE_END), strict=True)
     y = torch.cat([part.flatten(0, -2) for part in targets]).double()
     e = torch.cat([part.flatten(0, -2) for part in answers]).double() - y
@@ -146,7 +146,7 @@ def figures(net: Block, examples: Examples) -> dict[str, float]:
 
 
 def _answers(net: Block, examples: Examples, at_most: int, device: str = "cpu") -> Iterator[tuple[Tensor, Tensor]]:
-    """What the network says and what is right, of all examples or of `at_most`, evenly spread."""
+    """Yield outputs and targets of all examples, or of `at_most`, evenly spread."""
     net.eval()
     chosen = torch.linspace(0, len(examples) - 1, min(len(examples), at_most), dtype=torch.double).round().long()
     for part in chosen.split(AT_ONCE):
@@ -160,7 +160,7 @@ def _hopeless(history: History, recipe: Recipe) -> bool:
 
 
 def _plateau(history: History, recipe: Recipe) -> bool:
-    """Whether the training loss has not fallen for `patience` epochs since the rate was last halved."""
+    """Return whether the training loss has not fallen for `patience` epochs since the rate was last halved."""
     last = history.rate[-1]
     since = [loss for loss, rate in zip(history.train, history.rate, strict=True) if rate == last]
     best = min(history.train[: len(history.train) - len(since)], default=math.inf)
@@ -176,7 +176,7 @@ def _plateau(history: History, recipe: Recipe) -> bool:
 def range_test(
     net: Block, examples: Examples, batch: int, low: float = 1e-8, high: float = 1.0, steps: int = 400, seed: int = 0
 ) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
-    """The loss while the learning rate grows from batch to batch (paper, 3.4; Smith 2017): rates and losses.
+    """Give rates and losses while the learning rate grows from batch to batch (paper, 3.4; Smith 2017).
 
     Ends early when the loss is ten times the lowest one.
     """

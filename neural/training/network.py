@@ -8,7 +8,7 @@ import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -43,6 +43,8 @@ class Network(ABC):
     memory. log: folder for TensorBoard. Raises UnusableInput.
     """
 
+    stochastic: ClassVar[bool] = True
+
     mode: Literal["windowed", "stateful"] = "stateful"
     window: int = 40
     epochs: int = 30
@@ -62,7 +64,7 @@ class Network(ABC):
 
     @abstractmethod
     def net(self, inputs: int, outputs: int) -> Block:
-        """An untrained network with random weights."""
+        """Build an untrained network with random weights."""
 
     @property
     def windowed(self) -> bool:
@@ -77,7 +79,7 @@ class Network(ABC):
                        learning_rate=self.learning_rate or usual.learning_rate)  # fmt: skip
 
     def fit(self, data: TrainingSet, seed: int) -> None:
-        """Train; carries on from the last epoch of an interrupted run where SIMGAP_CHECKPOINTS names a folder."""
+        """Train; carry on from the last epoch of an interrupted run where SIMGAP_CHECKPOINTS names a folder."""
         examples, held_out, net = self.prepare(data, seed)
         checkpoint = self._checkpoint(data, seed)
         writer = _Log(self.log)
@@ -100,7 +102,7 @@ class Network(ABC):
             checkpoints.remove(checkpoint)
 
     def prepare(self, data: TrainingSet, seed: int) -> tuple[Examples, Examples, Block]:
-        """Examples to train on and to validate on, and the untrained network."""
+        """Make the examples to train on and to validate on, and the untrained network."""
         self.check()
         self.dt = data.dt
         nu, ny = len(data.channels.inputs), len(data.channels.outputs)
@@ -109,8 +111,8 @@ class Network(ABC):
         examples: Examples
         held_out: Examples
         if self.windowed:
-            given = (self.of_x, self.of_y, self.window, True, self.resident)
-            examples, held_out = windows.Windows(data.train, *given), windows.Windows(valid, *given)
+            options = (self.of_x, self.of_y, self.window, True, self.resident)
+            examples, held_out = windows.Windows(data.train, *options), windows.Windows(valid, *options)
             self.inputs = 1 + nu
         else:
             n = data.n_init
@@ -125,7 +127,7 @@ class Network(ABC):
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
-        """Free run, in double precision."""
+        """Run free, in double precision."""
         net = copy.deepcopy(self.trained).double()
         at_once = max(1, AT_ONCE // u.shape[1])
         with torch.no_grad(), one_thread():
@@ -141,7 +143,7 @@ class Network(ABC):
         return self.of_y.outside(y_hat.numpy())
 
     def range_test(self, data: TrainingSet, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        """Learning rates and the losses while the rate grows from batch to batch (paper, 3.4)."""
+        """Give learning rates and the losses while the rate grows from batch to batch (paper, 3.4)."""
         examples, _, net = self.prepare(data, seed)
         with one_thread():
             rates, losses = range_test(net, examples, self.recipe.batch, seed=seed)
@@ -158,15 +160,15 @@ class Network(ABC):
 
     @classmethod
     def load(cls, folder: Path, about: dict[str, Any]) -> Any:
-        """The model that `save` wrote, of which `about` is what model.json holds. Raises UnusableInput."""
+        """Read the model that `save` wrote, of which `about` is what model.json holds. Raises UnusableInput."""
         return weights.load(cls, folder, about)
 
     def hyper_parameters(self) -> dict[str, Any]:
-        """The fields that one may choose."""
+        """Give the fields that a user may choose."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.init}
 
     def check(self) -> None:
-        """Raises UnusableInput for hyper-parameters that make no sense."""
+        """Raise UnusableInput for hyper-parameters that make no sense."""
         if self.mode not in ("windowed", "stateful"):
             raise UnusableInput(f"the mode {self.mode!r} is not known; it is windowed or stateful")
         if self.window < 8 or self.epochs < 1:
@@ -182,10 +184,10 @@ class Network(ABC):
         folder = os.environ.get("SIMGAP_CHECKPOINTS")
         if not folder:
             return None
-        told = hashlib.sha256(repr((type(self).__qualname__, self.hyper_parameters(), seed, data.n_init)).encode())
+        digest = hashlib.sha256(repr((type(self).__qualname__, self.hyper_parameters(), seed, data.n_init)).encode())
         for x in data.train + data.valid:
-            told.update(x.u.tobytes() + x.y.tobytes())
-        return Path(folder) / f"{told.hexdigest()[:24]}.safetensors"
+            digest.update(x.u.tobytes() + x.y.tobytes())
+        return Path(folder) / f"{digest.hexdigest()[:24]}.safetensors"
 
 
 class _Log:

@@ -1,6 +1,7 @@
 """The passes of recurrent layers through time, compiled; arrays are [T, features, B].
 
-A backward kernel leaves the gradient before the bends in `d` [G H, T, B]; those of all weights are one product of it.
+A backward kernel leaves the gradient before the activations in `d` [G H, T, B]; one product of it gives those of
+all weights.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
 def tanh(x):
-    """tanh to 3e-7 by the rational function that Eigen uses (generic_fast_tanh_float); unlike exp it runs in SIMD."""
+    """Compute tanh to 3e-7 by the rational function that Eigen uses (generic_fast_tanh_float); it runs in SIMD."""
     x = min(max(x, np.float32(-7.90531110763549805)), np.float32(7.90531110763549805))
     s = x * x
     p = np.float32(-2.76076847742355e-16) * s + np.float32(2.00018790482477e-13)
@@ -30,13 +31,13 @@ def tanh(x):
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
 def sigmoid(x):
-    """1 / (1 + exp(-x))."""
+    """Compute 1 / (1 + exp(-x))."""
     return HALF + HALF * tanh(HALF * x)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def run_rnn(x, w, u, offset, h):
-    """h(k) = tanh(W x(k) + U h(k-1) + offset)."""
+    """Compute h(k) = tanh(W x(k) + U h(k-1) + offset)."""
     steps, units, batch = h.shape
     a, b = np.empty((units, batch), u.dtype), np.zeros((units, batch), u.dtype)
     for t in range(steps):
@@ -50,14 +51,14 @@ def run_rnn(x, w, u, offset, h):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def back_rnn(ut, h, dh, only_last, d):
-    """Backward pass of `run_rnn`; ut is U', dh the gradient of h."""
+    """Run `run_rnn` backwards; ut is U', dh the gradient of h."""
     steps, units, batch = h.shape
     e, now = np.zeros((units, batch), ut.dtype), np.empty((units, batch), ut.dtype)
     for t in range(steps - 1, -1, -1):
-        given = t == steps - 1 or not only_last
+        has_gradient = t == steps - 1 or not only_last
         for i in range(units):
             for k in range(batch):
-                g = e[i, k] + (dh[t, i, k] if given else ZERO)
+                g = e[i, k] + (dh[t, i, k] if has_gradient else ZERO)
                 g *= ONE - h[t, i, k] * h[t, i, k]
                 now[i, k] = g
                 d[i, t, k] = g
@@ -66,7 +67,7 @@ def back_rnn(ut, h, dh, only_last, d):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def run_gru(x, w, u, offset, inner_offset, h, gates, inner):
-    """r, z = sigma(.); n = tanh(W x + b + r (U h + c)); h(k) = (1 - z) n + z h(k-1). Gates r, z, n as in PyTorch."""
+    """Compute n = tanh(W x + b + r (U h + c)) and h(k) = (1 - z) n + z h(k-1) with gates r, z, n as in PyTorch."""
     steps, units, batch = h.shape
     a, b = np.empty((3 * units, batch), u.dtype), np.zeros((3 * units, batch), u.dtype)
     zero = np.zeros((units, batch), u.dtype)
@@ -90,16 +91,16 @@ def run_gru(x, w, u, offset, inner_offset, h, gates, inner):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def back_gru(ut, h, gates, inner, dh, only_last, d, d_inner):
-    """Backward pass of `run_gru`; d_inner is the gradient of what r multiplies."""
+    """Run `run_gru` backwards; d_inner is the gradient of what r multiplies."""
     steps, units, batch = h.shape
     e, now = np.zeros((units, batch), ut.dtype), np.empty((3 * units, batch), ut.dtype)
     keep, zero = np.empty((units, batch), ut.dtype), np.zeros((units, batch), ut.dtype)
     for t in range(steps - 1, -1, -1):
-        given = t == steps - 1 or not only_last
+        has_gradient = t == steps - 1 or not only_last
         before = h[t - 1] if t > 0 else zero
         for i in range(units):
             for k in range(batch):
-                g = e[i, k] + (dh[t, i, k] if given else ZERO)
+                g = e[i, k] + (dh[t, i, k] if has_gradient else ZERO)
                 r, z, n = gates[t, i, k], gates[t, units + i, k], gates[t, 2 * units + i, k]
                 dn = g * (ONE - z) * (ONE - n * n)
                 dr = dn * inner[t, i, k] * r * (ONE - r)
@@ -113,54 +114,3 @@ def back_gru(ut, h, gates, inner, dh, only_last, d, d_inner):
         for i in range(units):
             for k in range(batch):
                 e[i, k] += keep[i, k]
-
-
-@njit(cache=True, fastmath=True, error_model="numpy")
-def run_lstm(x, w, u, offset, h, gates, cells):
-    """i, f, o = sigma(.); g = tanh(.); c(k) = f c(k-1) + i g; h(k) = o tanh(c(k)). Gates i, f, g, o as in PyTorch."""
-    steps, units, batch = h.shape
-    a, b = np.empty((4 * units, batch), u.dtype), np.zeros((4 * units, batch), u.dtype)
-    zero = np.zeros((units, batch), u.dtype)
-    for t in range(steps):
-        before = cells[t - 1] if t > 0 else zero
-        np.dot(w, x[t], a)
-        if t > 0:
-            np.dot(u, h[t - 1], b)
-        for j in range(units):
-            for k in range(batch):
-                i = sigmoid(a[j, k] + b[j, k] + offset[j])
-                f = sigmoid(a[units + j, k] + b[units + j, k] + offset[units + j])
-                g = tanh(a[2 * units + j, k] + b[2 * units + j, k] + offset[2 * units + j])
-                o = sigmoid(a[3 * units + j, k] + b[3 * units + j, k] + offset[3 * units + j])
-                c = f * before[j, k] + i * g
-                gates[t, j, k], gates[t, units + j, k] = i, f
-                gates[t, 2 * units + j, k], gates[t, 3 * units + j, k] = g, o
-                cells[t, j, k] = c
-                h[t, j, k] = o * tanh(c)
-
-
-@njit(cache=True, fastmath=True, error_model="numpy")
-def back_lstm(ut, gates, cells, dh, only_last, d):
-    """Backward pass of `run_lstm`."""
-    steps, units, batch = cells.shape
-    e, now = np.zeros((units, batch), ut.dtype), np.empty((4 * units, batch), ut.dtype)
-    dc, zero = np.zeros((units, batch), ut.dtype), np.zeros((units, batch), ut.dtype)
-    for t in range(steps - 1, -1, -1):
-        given = t == steps - 1 or not only_last
-        before = cells[t - 1] if t > 0 else zero
-        for j in range(units):
-            for k in range(batch):
-                grad = e[j, k] + (dh[t, j, k] if given else ZERO)
-                i, f = gates[t, j, k], gates[t, units + j, k]
-                g, o = gates[t, 2 * units + j, k], gates[t, 3 * units + j, k]
-                bent = tanh(cells[t, j, k])
-                c = dc[j, k] + grad * o * (ONE - bent * bent)
-                di = c * g * i * (ONE - i)
-                df = c * before[j, k] * f * (ONE - f)
-                dg = c * i * (ONE - g * g)
-                do = grad * bent * o * (ONE - o)
-                dc[j, k] = c * f
-                now[j, k], now[units + j, k], now[2 * units + j, k], now[3 * units + j, k] = di, df, dg, do
-                d[j, t, k], d[units + j, t, k] = di, df
-                d[2 * units + j, t, k], d[3 * units + j, t, k] = dg, do
-        np.dot(ut, now, e)

@@ -23,26 +23,26 @@ class Scaling:
 
     @classmethod
     def of(cls, columns: Sequence[Float[np.ndarray, "_ n"]]) -> Scaling:
-        """From the extremes of training data; a column that never moves is only shifted."""
+        """Take the scaling from the extremes of training data; a column that never moves is only shifted."""
         low = np.min([column.min(axis=0) for column in columns], axis=0)
         high = np.max([column.max(axis=0) for column in columns], axis=0)
         half = np.where(high > low, (high - low) / 2, 1.0)
         return cls(tuple(map(float, (low + high) / 2)), tuple(map(float, half)))
 
     def inside(self, values: np.ndarray) -> np.ndarray:
-        """Physical units to -1 .. 1."""
+        """Convert physical units to -1 .. 1."""
         return (values - np.asarray(self.middle)) / np.asarray(self.half)
 
     def outside(self, values: np.ndarray) -> np.ndarray:
-        """-1 .. 1 to physical units."""
+        """Convert -1 .. 1 to physical units."""
         return values * np.asarray(self.half) + np.asarray(self.middle)
 
 
 def scalings(experiments: Sequence[Experiment], time: bool) -> tuple[Scaling, Scaling]:
-    """Of the features (voltage, say, and time if wanted) and of the outputs."""
+    """Scale the features (voltage, say, and time if wanted) and the outputs."""
     return Scaling.of([features(x.u, x.dt, time) for x in experiments]), Scaling.of([x.y for x in experiments])
 
 
 def features(u: Float[np.ndarray, "T nu"], dt: float, time: bool) -> Float[np.ndarray, "T F"]:
-    """The inputs, and before them the time since the start in s if wanted (paper, 3.1)."""
+    """Give the inputs, and before them the time since the start in s if wanted (paper, 3.1)."""
     return np.column_stack((dt * np.arange(len(u)), u)) if time else u

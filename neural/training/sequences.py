@@ -37,8 +37,8 @@ class Sequences(Examples):
             raise UnusableInput(f"no experiment is longer than the {n} samples that find the state")
         u = np.concatenate([of_u.inside(x.u) for x in usable])
         y = np.concatenate([of_y.inside(x.y) for x in usable])
-        held = torch.from_numpy(np.concatenate((u, y), axis=1).astype(np.float32))
-        self.views = held.unfold(0, self.length, 1).transpose(1, 2)  # [N, L, nu + ny]
+        signals = torch.from_numpy(np.concatenate((u, y), axis=1).astype(np.float32))
+        self.views = signals.unfold(0, self.length, 1).transpose(1, 2)  # [N, L, nu + ny]
         self.nu = u.shape[1]
         firsts = np.concatenate(([0], np.cumsum([len(x) for x in usable])[:-1]))
         rows = np.concatenate(
@@ -51,23 +51,23 @@ class Sequences(Examples):
         return len(self.rows)
 
     def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Float[Tensor, "B L F"], Float[Tensor, "B K ny"]]:
-        """Features of the chosen pieces, and the outputs of their free runs."""
+        """Give features of the chosen pieces, and the outputs of their free runs."""
         pieces = self.views[self.rows[chosen]]
         u, y = pieces[:, :, : self.nu], pieces[:, :, self.nu :]
-        return started(u, y[:, : self.n]), y[:, self.n :]
+        return with_start(u, y[:, : self.n]), y[:, self.n :]
 
     def answer(self, net: Block, x: Float[Tensor, "B L F"]) -> Float[Tensor, "B K ny"]:
-        """What the network says to a batch, without the samples that found the state."""
+        """Compute the network's outputs for a batch, without the samples that found the state."""
         return net(x)[:, self.n :]
 
 
-def started(u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Tensor, "B T F"]:
-    """The features of a run that starts with n measured samples."""
-    rest = u.shape[1] - y.shape[1]
-    known = torch.cat((y, torch.ones_like(y[:, :, :1])), dim=2)
-    return torch.cat((u, torch.nn.functional.pad(known, (0, 0, 0, rest))), dim=2)
+def with_start(u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Tensor, "B T F"]:
+    """Make the features of a run that starts with n measured samples."""
+    free = u.shape[1] - y.shape[1]
+    measured = torch.cat((y, torch.ones_like(y[:, :, :1])), dim=2)
+    return torch.cat((u, torch.nn.functional.pad(measured, (0, 0, 0, free))), dim=2)
 
 
 def simulate(net: Block, u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Tensor, "B N ny"]:
-    """Rows n .. T-1 of B experiments from their n measured samples."""
-    return net(started(u, y))[:, y.shape[1] :]
+    """Simulate rows n .. T-1 of B experiments from their n measured samples."""
+    return net(with_start(u, y))[:, y.shape[1] :]

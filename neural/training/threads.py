@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """One thread for torch and for the BLAS behind the compiled loops; afterwards as many as before."""
+    """Use one thread for torch and for the BLAS behind the compiled loops; afterwards as many as before."""
     before = torch.get_num_threads()
     with threadpool_limits(1):
         torch.set_num_threads(1)

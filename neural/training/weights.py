@@ -35,7 +35,7 @@ def save(model: Any, folder: Path) -> None:
 
 
 def load(kind: type, folder: Path, about: dict[str, Any]) -> Any:
-    """The network of that class that was saved into a folder. Raises UnusableInput for anything else."""
+    """Read the network of that class that was saved into a folder. Raises UnusableInput for anything else."""
     try:
         if about["schema"] != SCHEMA:
             raise UnusableInput(f"{folder}: schema {about['schema']!r} is unknown; this simgap reads schema {SCHEMA}")

@@ -32,12 +32,12 @@ class Windows(Examples):
             raise UnusableInput(f"no experiment is longer than the window of {window} samples; choose a smaller window")
         counts = [len(x) - window for x in self.experiments]
         self.ends = np.cumsum(counts)
-        self.held: tuple[Tensor, Tensor] | None = None
+        self.in_memory: tuple[Tensor, Tensor] | None = None
         if resident:
             x = np.concatenate([of_x.inside(features(e.u, e.dt, time)) for e in self.experiments])
             y = np.concatenate([of_y.inside(e.y) for e in self.experiments])
             views = torch.from_numpy(x.astype(np.float32)).unfold(0, window, 1).transpose(1, 2)
-            self.held = views, torch.from_numpy(y.astype(np.float32))
+            self.in_memory = views, torch.from_numpy(y.astype(np.float32))
             firsts = np.concatenate(([0], np.cumsum([len(e) for e in self.experiments])[:-1]))
             rows = [first + np.arange(count) for first, count in zip(firsts, counts, strict=True)]
             self.rows = torch.from_numpy(np.concatenate(rows))
@@ -46,9 +46,9 @@ class Windows(Examples):
         return int(self.ends[-1])
 
     def batch(self, chosen: Int[Tensor, " B"]) -> tuple[Float[Tensor, "B W F"], Float[Tensor, "B ny"]]:
-        """Inputs and targets of the chosen windows, scaled."""
-        if self.held is not None:
-            views, y = self.held
+        """Give inputs and targets of the chosen windows, scaled."""
+        if self.in_memory is not None:
+            views, y = self.in_memory
             rows = self.rows[chosen]
             return views[rows], y[rows + self.window]
         which = np.searchsorted(self.ends, chosen.numpy(), side="right")
@@ -64,14 +64,14 @@ class Windows(Examples):
         return torch.from_numpy(x.astype(np.float32)), torch.from_numpy(y.astype(np.float32))
 
     def answer(self, net: Block, x: Float[Tensor, "B W F"]) -> Float[Tensor, "B ny"]:
-        """What the network says to a batch."""
+        """Compute the network's outputs for a batch."""
         return net.last(x)
 
 
 def simulate(
     net: Block, x: Float[Tensor, "B T F"], n: int, window: int, at_once: int = 1024
 ) -> Float[Tensor, "B N ny"]:
-    """Rows n .. T-1 of B experiments; before their start the inputs stood still."""
+    """Simulate rows n .. T-1 of B experiments; before their start the inputs stood still."""
     before = x[:, :1].expand(-1, max(0, window - n), -1)
     padded = torch.cat((before, x[:, max(0, n - window) : -1]), dim=1)
     views = padded.unfold(1, window, 1).transpose(2, 3)  # [B, N, W, F]

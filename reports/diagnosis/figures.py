@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simgap.findings import Findings, Profile, Trace, Value, Wrong
-from simgap.reports.diagnosis.traces import shown_range, thinned
-from simgap.reports.diagnosis.words import LAST, shortened
+from simgap.reports.diagnosis.traces import axis_range, thin
+from simgap.reports.diagnosis.words import LAST, shorten
 from simgap.reports.rendering import printable
 
 if TYPE_CHECKING:
@@ -33,13 +33,13 @@ DIRECTIONS = {-1.0: "back", 0.0: "at rest", 1.0: "forwards"}
 
 
 def label(name: str, unit: str = "") -> str:
-    """A name with its unit as plotly shows it: plotly obeys some HTML in texts, so none may be left."""
-    text = shortened(printable(name)) + (f" [{shortened(printable(unit), 20)}]" if unit else "")
+    """Write a name with its unit for plotly, which obeys some HTML in texts, so that none may be left."""
+    text = shorten(printable(name)) + (f" [{shorten(printable(unit), 20)}]" if unit else "")
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def trace_figure(trace: Trace, findings: Findings, curves: int) -> go.Figure:
-    """One experiment: each output measured and simulated, the inputs below. `curves`: how many the page will have."""
+    """Draw one experiment: each output measured and simulated, the inputs below; `curves` are those of the page."""
     from plotly.subplots import make_subplots
 
     outputs, inputs = list(findings.units.items()), findings.inputs
@@ -56,12 +56,12 @@ def trace_figure(trace: Trace, findings: Findings, curves: int) -> go.Figure:
     for i, (name, unit) in enumerate(outputs):
         drawn = [("measured", trace.y, MEASURED, 2.4), *simulated]
         for key, y, colour, width in drawn:
-            _line(figure, i + 1, thinned(trace.t, y[:, i], points), key, colour, width)
-        figure.update_yaxes(range=shown_range(trace.y[:, i], [y[:, i] for _, y, _, _ in simulated]), row=i + 1, col=1)
+            _line(figure, i + 1, thin(trace.t, y[:, i], points), key, colour, width)
+        figure.update_yaxes(range=axis_range(trace.y[:, i], [y[:, i] for _, y, _, _ in simulated]), row=i + 1, col=1)
         _heading(figure, i + 1, label(name, unit))
     for i, (name, unit) in enumerate(inputs):
         row = len(outputs) + i + 1
-        _line(figure, row, thinned(trace.t, trace.u[:, i], points), "input", INPUT, 1.3, shape="hv")
+        _line(figure, row, thin(trace.t, trace.u[:, i], points), "input", INPUT, 1.3, shape="hv")
         _heading(figure, row, f"input {label(name, unit)}")
     figure.update_xaxes(title_text="time [s]", row=len(heights), col=1)
     figure.update_xaxes(range=[float(trace.t[0]), float(trace.t[-1])] if len(trace.t) > 1 else None)
@@ -69,12 +69,12 @@ def trace_figure(trace: Trace, findings: Findings, curves: int) -> go.Figure:
 
 
 def curves_of(findings: Findings) -> int:
-    """How many curves one experiment has."""
+    """Count the curves of one experiment."""
     return len(findings.units) * (3 if findings.verdict == "named" else 2) + len(findings.inputs)
 
 
 def view_figure(view: Wrong, unit: str) -> go.Figure | None:
-    """The mean error (the RMS error of bands and sizes) over the view's places; `unit` is the output's."""
+    """Draw the mean error (the RMS error of bands and sizes) over the view's places; `unit` is the output's."""
     import plotly.graph_objects as go
 
     at, error = np.array(view.at), np.array(view.error)
@@ -102,7 +102,7 @@ def view_figure(view: Wrong, unit: str) -> go.Figure | None:
 
 
 def profile_figure(profile: Profile, estimate: Value | None) -> go.Figure | None:
-    """The deviance over the values of one parameter; what lies below the line is the 95 % interval."""
+    """Draw the deviance over the values of one parameter; what lies below the line is the 95 % interval."""
     import plotly.graph_objects as go
 
     pairs = {v: d for v, d in zip(profile.values, profile.deviance, strict=True) if math.isfinite(v + d)}
@@ -134,7 +134,7 @@ def _line(
 
 
 def _heading(figure: go.Figure, row: int, text: str) -> None:
-    """What the axis shows, written above it: beside it there is no room on a phone."""
+    """Write what the axis shows above it: beside it there is no room on a phone."""
     axis = "" if row == 1 else str(row)
     figure.add_annotation(
         text=text, showarrow=False, x=0, xref=f"x{axis} domain", xanchor="left", y=1, yref=f"y{axis} domain",

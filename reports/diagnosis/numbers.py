@@ -1,22 +1,15 @@
-"""Numbers of a diagnosis as people read them: no more digits than they deserve, and words for what is no number."""
+"""Estimates, fits and changes of a diagnosis as people read them, and words for what is no number."""
 
 from __future__ import annotations
 
 import math
-import re
 
 from simgap.findings import Value
-
-
-def number(value: float, digits: int = 3) -> str:
-    """0.012345 -> "0.0123", 12345.6 -> "12346": `digits` significant ones, but never rounded before the point."""
-    if not math.isfinite(value) or value == 0:
-        return f"{value:g}"
-    return _fixed(value, max(digits - 1 - _size(value), 0))
+from simgap.wording import number, percent, short_exponent
 
 
 def numbers(value: float, low: float, high: float) -> tuple[str, str, str]:
-    """An estimate and the ends of its interval, with as many digits as the interval deserves and the estimate needs.
+    """Write an estimate and its interval with as many digits as the interval deserves and the estimate needs.
 
     6.8432, 6.7112, 6.9743 -> "6.84", "6.71", "6.97".
     """
@@ -29,36 +22,20 @@ def numbers(value: float, low: float, high: float) -> tuple[str, str, str]:
     return _fixed(value, further), _fixed(low, places), _fixed(high, places)
 
 
-def percent(share: float) -> str:
-    """0.613 -> "61 %", 0.9968 -> "99.7 %": what lacks to 100 % shows."""
-    percents = 100 * share
-    if not math.isfinite(percents):
-        return "an unknown share"
-    if 0 < abs(percents) < 1:
-        return "less than 1 %"
-    places = -_size(100 - percents) if 99 < percents < 100 else 0
-    return f"{percents:.{min(max(places, 0), 6)}f} %"
-
-
-def amount(value: float, unit: str, digits: int = 3) -> str:
-    """2.5, "deg" -> "2.5 deg"."""
-    return f"{number(value, digits)} {unit}".rstrip() if math.isfinite(value) else "diverges"
-
-
 def fit(percents: float) -> str:
-    """A fit of 100 (1 - RMSE / standard deviation): 76.04 -> "76.0 %"; there is none for a constant output."""
+    """Write a fit of 100 (1 - RMSE / standard deviation), 76.04 -> "76.0 %"; there is none for a constant output."""
     if not math.isfinite(percents):
         return "undefined" if math.isnan(percents) else "diverges"
     return f"{percents:.1f} %" if percents <= 99 or percents >= 100 else percent(percents / 100)
 
 
 def estimate(value: Value) -> str:
-    """ "6.84 mm/s^2"."""
+    """Write an estimate with its unit: "6.84 mm/s^2"."""
     return f"{numbers(value.value, value.low, value.high)[0]} {value.unit}".rstrip()
 
 
 def interval(value: Value) -> str:
-    """ "6.71 to 6.97", with what else it is than a 95 % interval."""
+    """Write an interval, "6.71 to 6.97", and what it is if it is no 95 % interval."""
     if value.low == value.high:
         return "read off the data, not estimated"
     if not (math.isfinite(value.low) and math.isfinite(value.high)):
@@ -69,14 +46,14 @@ def interval(value: Value) -> str:
 
 
 def change(before: float, after: float) -> str:
-    """1.2, 0.6 -> "-50 %"."""
+    """Write a change in percent: 1.2, 0.6 -> "-50 %"."""
     if not (math.isfinite(before) and math.isfinite(after) and before > 0):
         return ""
     return f"{100 * (after / before - 1):+.0f} %".replace("+0 %", "0 %").replace("-0 %", "0 %")
 
 
 def part(value: float, other: float) -> str:
-    """How long a bar for `value` is beside one for `other`, the longer being 1."""
+    """Compute how long a bar for `value` is beside one for `other`, the longer being 1."""
     if not math.isfinite(value):
         return "1"
     return f"{value / max(value, other):.3f}" if math.isfinite(other) and max(value, other) > 0 else "0"
@@ -87,14 +64,14 @@ def _size(value: float) -> int:
 
 
 def _fixed(value: float, places: int) -> str:
-    """`value` rounded to that many decimal places, which may be negative; 0 and whole digits stay short."""
+    """Round to that many decimal places, which may be negative; 0 and whole digits stay short."""
     if not math.isfinite(value):
         return f"{value:g}"
     if abs(value) < 0.5 * 10.0**-places:
         return "0"
     size = _size(value)
     if not -4 <= size < 6:
-        return re.sub(r"e([+-])0*", r"e\1", f"{value:.{max(size + places, 0)}e}").replace("e+", "e")
+        return short_exponent(f"{value:.{max(size + places, 0)}e}")
     if float(value).is_integer() and abs(value) < 10:
         return f"{value:.0f}"
     return f"{round(value, places):.{max(places, 0)}f}"

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simgap import wording
 from simgap.findings import Cause, Findings, Wrong
 from simgap.reports.diagnosis import figures, numbers, words
-from simgap.reports.diagnosis.traces import chosen
+from simgap.reports.diagnosis.traces import choose
 from simgap.reports.rendering import printable
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class _Plots:
         self.count = 0
 
     def draw(self, figure: go.Figure | None) -> str:
-        """The HTML of a plot, which is safe: no < in its JSON can end the script around it, plotly writes \\u003c."""
+        """Draw a plot as HTML, which is safe: no < in its JSON can end the script around it, plotly writes \\u003c."""
         if figure is None:
             return ""
         from plotly.io import to_html
@@ -36,7 +37,7 @@ class _Plots:
 
 
 def diagnosis_page(findings: Findings) -> str:
-    """The whole answer: headline, gain, experiments, causes, everything else that the simulation gets wrong.
+    """Write the whole answer: headline, gain, experiments, causes, everything else that the simulation gets wrong.
 
     Whatever comes from a data set is text there: it is escaped, in plots too, and the page may load nothing.
     """
@@ -52,22 +53,23 @@ def diagnosis_page(findings: Findings) -> str:
     content = {
         "findings": findings,
         "numbers": numbers,
+        "wording": wording,
         "words": words,
         "traces": _traces(findings, plots),
         "causes": [_cause(cause, findings, plots, shown) for cause in findings.causes],
     }
-    rest = [view for view in words.telling(findings) if id(view) not in shown]
+    rest = [view for view in words.beyond_chance(findings) if id(view) not in shown]
     content["views"] = [(view, _view(view, findings, plots)) for view in rest]
     return environment.get_template("diagnosis.html").render(content, plotly=get_plotlyjs() if plots.count else "")
 
 
 def _finalize(value: Any) -> Any:
-    """Strings lose what is not printable on their way into the page; markup stays."""
+    """Strip what is not printable from a string on its way into the page; markup stays."""
     return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
 def _traces(findings: Findings, plots: _Plots) -> list[dict[str, Any]]:
-    picked = chosen(findings.traces, findings.verdict == "named")
+    picked = choose(findings.traces, findings.verdict == "named")
     curves = len(picked) * figures.curves_of(findings)
     return [
         {"name": trace.experiment, "why": why, "plot": plots.draw(figures.trace_figure(trace, findings, curves))}
@@ -76,9 +78,9 @@ def _traces(findings: Findings, plots: _Plots) -> list[dict[str, Any]]:
 
 
 def _cause(cause: Cause, findings: Findings, plots: _Plots, shown: set[int]) -> dict[str, Any]:
-    """One cause with its plots. A view stands beside the first cause that it shows; `shown` collects them."""
+    """Describe one cause with its plots. A view stands beside the first cause that it shows; `shown` collects them."""
     sensed = cause.channel if cause.channel in findings.units else ""
-    showing = [v for v in words.telling(findings) if words.shows(v, cause) and sensed in ("", v.output)]
+    showing = [v for v in words.beyond_chance(findings) if words.shows(v, cause) and sensed in ("", v.output)]
     views = [view for view in showing if id(view) not in shown][:VIEWS]
     above = [view for view in showing if id(view) in shown]
     shown |= {id(view) for view in views}

@@ -8,12 +8,13 @@ from collections.abc import Iterator
 from simgap.findings import Cause, Findings
 from simgap.reports.diagnosis import numbers, words
 from simgap.reports.rendering import printable
+from simgap.wording import amount, percent
 
 VIEWS = 3  # of what is wrong; the page shows all
 
 
 def diagnosis_text(findings: Findings, width: int = 100) -> str:
-    """What was found, in lines of at most `width` characters that a control engineer can act on.
+    """Write the answer in lines of at most `width` characters that a control engineer can act on.
 
     Names from data sets are shown, never obeyed: what a terminal would interpret is left out.
     """
@@ -23,14 +24,14 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         *_section("What it gets wrong", _wrong(findings), width),
     ]
     for i, cause in enumerate(findings.causes, start=1):
-        paragraphs += _section(f"Cause {i}: {words.named(cause, findings)}", _cause(cause), width)
+        paragraphs += _section(f"Cause {i}: {words.cause_title(cause, findings)}", _cause(cause), width)
     if second := words.runner_up(findings):
         paragraphs += _section("Runner-up", [second], width)
     if findings.causes:
         paragraphs += _section("Free-run RMSE on the test experiments", _gain(findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
-        share = f"explains {numbers.percent(offer.explained)} of the squared error of the force, held out"
+        share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
     if findings.causes:
@@ -44,7 +45,7 @@ def _section(title: str, items: Iterator[str] | list[str] | tuple[str, ...], wid
 
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
-    """Further lines stand deeper, so that one sees where an item begins."""
+    """Wrap an item, its further lines indented, so that one sees where it begins."""
     return textwrap.wrap(
         printable(text), max(width, 20), initial_indent=indent, subsequent_indent=2 * indent, break_on_hyphens=False
     )
@@ -55,11 +56,11 @@ def _baseline(findings: Findings) -> Iterator[str]:
     yield f"order {words.orders(plain.get('order', 'unknown'))}"
     for name, rmse in plain.get("rmse", {}).items():
         fit = numbers.fit(plain.get("fit_percent", {}).get(name, float("nan")))
-        yield f"{name}: free-run RMSE {numbers.amount(rmse, findings.units.get(name, ''))}, fit {fit}"
+        yield f"{name}: free-run RMSE {amount(rmse, findings.units.get(name, ''))}, fit {fit}"
 
 
 def _wrong(findings: Findings) -> list[str]:
-    views = words.telling(findings)
+    views = words.beyond_chance(findings)
     shown = [view for view in views if view.view != words.LAST][:VIEWS] or views[:1]
     return [view.text for view in shown] or ["No view of its error shows more than chance does."]
 
@@ -78,7 +79,7 @@ def _gain(findings: Findings) -> Iterator[str]:
     for name, before in gain.before.items():
         after, unit = gain.after.get(name, float("nan")), findings.units.get(name, "")
         change = numbers.change(before, after)
-        line = f"{name}: {numbers.amount(before, '')} -> {numbers.amount(after, unit)}"
+        line = f"{name}: {amount(before, '')} -> {amount(after, unit)}"
         yield f"{line} ({change})" if change else line
     if findings.left > 0.01:
-        yield f"The input could still predict {numbers.percent(findings.left)} of the plain model's squared error."
+        yield f"The input could still predict {percent(findings.left)} of the plain model's squared error."

@@ -12,8 +12,8 @@ from simgap.findings import Trace
 Curve = tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]
 
 
-def chosen(traces: Sequence[Trace], named: bool) -> list[tuple[Trace, str]]:
-    """Up to three test experiments and why they are shown.
+def choose(traces: Sequence[Trace], named: bool) -> list[tuple[Trace, str]]:
+    """Choose up to three test experiments, each with the reason why it is shown.
 
     With causes: the one that they improve most, one in the middle, and the one with the largest error left; without,
     those with the smallest, a middle and the largest error. Errors are in units of each output's spread.
@@ -34,8 +34,8 @@ def chosen(traces: Sequence[Trace], named: bool) -> list[tuple[Trace, str]]:
     return [(traces[i], ", ".join(listed)) for i, listed in reasons.items()]
 
 
-def thinned(t: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"], points: int) -> Curve:
-    """At most `points` samples: the smallest and the largest of each bucket of time, in their order.
+def thin(t: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"], points: int) -> Curve:
+    """Thin a curve to at most `points` samples: the smallest and the largest of each bucket of time, in their order.
 
     What is not finite becomes NaN, a gap; it takes the place of others only in a bucket that holds nothing else.
     """
@@ -52,8 +52,8 @@ def thinned(t: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"], points: int)
     return t[kept], y[kept]
 
 
-def shown_range(y: Float[np.ndarray, " N"], simulated: Sequence[Float[np.ndarray, " N"]]) -> tuple[float, float] | None:
-    """What the axis spans: the measurement, and a simulation that leaves it only as far again, even if it diverges."""
+def axis_range(y: Float[np.ndarray, " N"], simulated: Sequence[Float[np.ndarray, " N"]]) -> tuple[float, float] | None:
+    """Find the range of the axis: the measurement, and of a simulation that leaves it at most as much again."""
     finite = y[np.isfinite(y)]
     if not len(finite):
         return None
@@ -68,7 +68,7 @@ def shown_range(y: Float[np.ndarray, " N"], simulated: Sequence[Float[np.ndarray
 
 
 def _error(trace: Trace, simulated: Float[np.ndarray, "N ny"]) -> float:
-    """RMSE over all outputs, each in units of its spread; a simulation that diverged has the largest there is."""
+    """Compute the RMSE over all outputs, each in units of its spread; one that diverged has the largest there is."""
     spread = np.std(trace.y, axis=0)
     error = (trace.y - simulated) / np.where(spread > 0, spread, 1.0)
     if not (error.size and np.isfinite(error).all()):

@@ -6,14 +6,14 @@ import math
 from collections.abc import Sequence
 
 from simgap.findings import Cause, Findings, Wrong
-from simgap.reports.diagnosis.numbers import number, percent
+from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
 LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
 
 
 def headline(findings: Findings) -> str:
-    """The verdict in a sentence."""
+    """Say the verdict in a sentence."""
     gain = findings.gain
     if findings.verdict == "nothing_found":
         return (
@@ -25,7 +25,7 @@ def headline(findings: Findings) -> str:
             "Something is there, but nothing in the catalogue explains it: "
             f"{percent(findings.left)} of the squared error could still be predicted from the input."
         )
-    names = [named(cause, findings) for cause in findings.causes]
+    names = [cause_title(cause, findings) for cause in findings.causes]
     listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
     them, size = "it" if len(names) == 1 else "them", abs(gain.share)
     start = f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments"
@@ -34,14 +34,14 @@ def headline(findings: Findings) -> str:
     return f"{start} {'falls' if gain.share >= 0 else 'rises'} by {percent(size)}{_range(findings)}."
 
 
-def named(cause: Cause, findings: Findings) -> str:
-    """The title, with the channel where there are several to choose from."""
+def cause_title(cause: Cause, findings: Findings) -> str:
+    """Name a cause by its title, with the channel where there are several to choose from."""
     several = len(findings.inputs) > 1 or len(findings.units) > 1
     return f"{cause.title} ({cause.channel})" if cause.channel and several else cause.title
 
 
 def evidence(cause: Cause) -> str:
-    """What the effect explains, in training and held out, in one or two sentences."""
+    """Say what the effect explains, in training and held out, in one or two sentences."""
     held_out = (
         f"on held-out data the squared error is {percent(cause.gain)} smaller with it than without"
         if cause.gain > 0
@@ -59,7 +59,7 @@ def evidence(cause: Cause) -> str:
 
 
 def runner_up(findings: Findings) -> str:
-    """The best effect that was not named, in a sentence; empty without one."""
+    """Say in a sentence which effect was the best that was not named; empty without one."""
     second = findings.runner_up
     if not second:
         return ""
@@ -70,29 +70,29 @@ def runner_up(findings: Findings) -> str:
     return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
 
 
-def telling(findings: Findings) -> list[Wrong]:
-    """The views that chance does not explain, the one with the largest share first, the least telling ones last."""
+def beyond_chance(findings: Findings) -> list[Wrong]:
+    """List the views that chance does not explain, the largest share first, the frequency band last."""
     views = [view for view in findings.wrong if view.chance < CHANCE]
     return sorted(views, key=lambda view: (view.view == LAST, -view.share))
 
 
 def shows(view: Wrong, cause: Cause) -> bool:
-    """Whether a view is one of those that show the effect."""
+    """Tell whether a view is one of those that show the effect."""
     return view.view in cause.shows_in
 
 
 def orders(order: object) -> str:
-    """2 -> "2"; [2, 1] -> "2, 1", one per plant."""
+    """List the order of each plant: 2 -> "2"; [2, 1] -> "2, 1"."""
     return ", ".join(map(str, order)) if isinstance(order, Sequence) and not isinstance(order, str) else str(order)
 
 
-def shortened(text: str, longest: int = 32) -> str:
-    """Names that leave room for the plot they label."""
+def shorten(text: str, longest: int = 32) -> str:
+    """Shorten a name so that it leaves room for the plot it labels."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def capital(text: str) -> str:
-    """The same, at the beginning of a line."""
+def capitalise(text: str) -> str:
+    """Begin a text with a capital letter."""
     return text[:1].upper() + text[1:]
 
 

@@ -30,7 +30,7 @@ class Figures:
     values: Mapping[str, Values]
 
     def __call__(self, label: str, column: str) -> float:
-        """Raises Undecided."""
+        """Decide a claim on figures and say which. Raises Undecided where some are missing."""
         try:
             return self.values[label][column]
         except KeyError:
@@ -206,7 +206,7 @@ _untold("networks need much more data to avoid overfitting", "4.5", "the suite h
 
 
 def _scores(f: Figures, model: str) -> list[float]:
-    """The six columns of Tables 2 and 4."""
+    """Collect the six columns of Tables 2 and 4."""
     return [f(DELTA[model], c) for c in PRINTED[1].columns] + [f(model, c) for c in PRINTED[3].columns]
 
 
@@ -215,7 +215,7 @@ def _on_both(f: Figures, model: str, column: str) -> float:
 
 
 def _ranks(values: Mapping[str, float]) -> dict[str, int]:
-    """1 for the lowest value; equal ones share the better rank."""
+    """Rank values, 1 for the lowest; equal ones share the better rank."""
     return {k: 1 + sum(other < value for other in values.values()) for k, value in values.items()}
 
 
@@ -240,7 +240,7 @@ def _spread(values: list[float]) -> float:
 
 
 def _ratio(a: float, b: float) -> float:
-    """a / b, and 1 for two that are equal, infinities and zeros too."""
+    """Divide a by b; 1 for two that are equal, infinities and zeros too."""
     if a == b:
         return 1.0
     return a / b if b else math.inf

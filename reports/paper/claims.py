@@ -31,7 +31,7 @@ class Claim:
 
 
 def claims(results: Sequence[Result]) -> list[Claim]:
-    """All claims. One holds, or does not, if the medians over the seeds say so and so do most of the seeds."""
+    """Decide all claims: one holds, or does not, if the medians over the seeds say so and so do most of the seeds."""
     by_label = {label: values_by_seed(rows) for label, rows in rows_by_label(results).items()}
     seeds = sorted({seed for found in by_label.values() for seed in found})
     medians = Figures({label: _medians(list(found.values())) for label, found in by_label.items()})
@@ -46,7 +46,7 @@ def claims(results: Sequence[Result]) -> list[Claim]:
 
 
 def claims_table(found: Sequence[Claim]) -> Table:
-    """The checklist; the footnotes are the rules."""
+    """Make the checklist, with the rules as footnotes."""
     rules = list(dict.fromkeys(claim.rule for claim in found))
     rows = [
         [
@@ -78,7 +78,7 @@ def _decide(rule: Rule, medians: Figures, seeds: Sequence[Figures]) -> tuple[Ver
 
 
 def _vote(rule: Rule, seed: Figures) -> bool | None:
-    """None for a seed that lacks figures."""
+    """Decide a claim by one seed; None where it lacks figures."""
     try:
         return rule(seed)[0]
     except Undecided:
@@ -91,6 +91,6 @@ def _medians(found: Sequence[Values]) -> Values:
 
 
 def _printed() -> dict[str, Values]:
-    """What the paper prints of each model, all tables together."""
+    """Collect what the paper prints of each model, all tables together."""
     labels = {label for table in PRINTED for label in table.rows}
     return {k: {c: v for table in PRINTED for c, v in table.rows.get(k, {}).items()} for k in labels}

@@ -50,7 +50,7 @@ LABELS = tuple(dict.fromkeys(label for table in PRINTED for label in table.rows)
 
 
 def paper_tables(results: Sequence[Result]) -> list[Table]:
-    """Tables 1 to 4 of the paper, ours and its own figures; every model has a row, whatever became of it."""
+    """Make Tables 1 to 4 of the paper, ours and its own figures; every model has a row, whatever became of it."""
     rows_of = rows_by_label(results)
     stored = [standing.rows[0].model for standing in standings(_ours_of(results))]
     doubled = sorted({label for label in stored if stored.count(label) > 1})
@@ -60,23 +60,23 @@ def paper_tables(results: Sequence[Result]) -> list[Table]:
 
 
 def of_paper(results: Sequence[Result]) -> bool:
-    """Whether these are results of the suite `paper`: models with its labels, scored on differences of the gimbal."""
+    """Tell whether results are of the suite `paper`: models with its labels, scored on differences of the gimbal."""
     return any(row.task == "differences" for rows in rows_by_label(results).values() for row in rows)
 
 
 def rows_by_label(results: Sequence[Result]) -> dict[str, tuple[Result, ...]]:
-    """The rows of each of the paper's models; of several sets of parameters, the one that comes last."""
+    """Sort rows by the paper's models; of several sets of parameters, the one that comes last counts."""
     return {standing.rows[0].model: standing.rows for standing in standings(_ours_of(results))}
 
 
 def values_by_seed(rows: Sequence[Result]) -> dict[int, Values]:
-    """The figures of one model for each seed, by the paper's columns; what there is no figure of is left out."""
+    """Collect the figures of one model for each seed, by the paper's columns; columns without a figure are left out."""
     seeds = sorted({row.seed for row in rows})
     return {seed: _values([row for row in rows if row.seed == seed]) for seed in seeds}
 
 
 def pooled_mse(rows: Sequence[Result], output: str) -> float | None:
-    """sum(n MSE) / sum(n) over test experiments; None when one of them was not simulated."""
+    """Compute sum(n MSE) / sum(n) over test experiments; None when one of them was not simulated."""
     figures = [row.metrics.get(output, {}) for row in rows]
     if not figures or not all(figure.get("n_scored") for figure in figures):
         return None
@@ -84,7 +84,7 @@ def pooled_mse(rows: Sequence[Result], output: str) -> float | None:
 
 
 def rises(losses: Sequence[float]) -> float:
-    """Mean of max(0, L(k+1) - L(k)) over the epochs k, relative to the lowest loss: 0 for a loss that only falls."""
+    """Average max(0, L(k+1) - L(k)) over the epochs k, relative to the lowest loss: 0 for a loss that only falls."""
     ups = [max(0.0, later - earlier) for earlier, later in pairwise(losses)]
     return sum(ups) / len(ups) / min(losses)
 
@@ -160,7 +160,7 @@ def _mark(rows: list[list[Cell]], column: int, sign: int) -> None:
 
 
 def _with_unit(column: str, rows: Sequence[Result]) -> str:
-    """Mean squares of an output have its unit, squared."""
+    """Head a column with its unit; mean squares of an output have its unit, squared."""
     output = next((output for output in OUTPUTS if f" {output} " in column), "")
     unit = next((row.units[output] for row in rows if row.units.get(output)), "")
     if not unit:
@@ -169,7 +169,7 @@ def _with_unit(column: str, rows: Sequence[Result]) -> str:
 
 
 def _about(printed: Printed, rows: Sequence[Result], classical: bool) -> list[str]:
-    """What one has to know to read the table."""
+    """Say what one has to know to read the table."""
     seeds = len({row.seed for row in rows})
     texts = [
         "Ours were scored on simulated recordings of the gimbal, because the paper's are not public: compare the "

@@ -75,6 +75,10 @@ class Counts(Base):
     "n_params is no number."
     n_params = "many"
 
+class Guesses(Base):
+    "stochastic is no yes or no."
+    stochastic = 0.3
+
 class NeedsMany(Base):
     "Wants two samples to start."
     def simulate(self, u, y_init):
@@ -102,6 +106,7 @@ def broken(tmp_path):
         ("Raises", "fit raised ValueError: no idea (broken.py, line "),
         ("Nameless", "the class has no docstring"),
         ("Counts", "n_params is 'many'"),
+        ("Guesses", "stochastic is 0.3; make it True"),
         ("NeedsMany", "simulate raised IndexError"),
     ],
 )

@@ -178,6 +178,28 @@ def test_emps_is_read_from_its_files_in_volts_and_metres(made):
     assert [channel.unit for channel in data.channels.inputs + data.channels.outputs] == ["V", "m"]
 
 
+def sample_pulses_every(made, dt: float) -> None:
+    """Write the test file of EMPS anew with another clock."""
+    file = made / "EMPS" / "DATA_EMPS_PULSES.mat"
+    columns = {key: loadmat(file)[key] for key in ("qm", "qg", "vir")}
+    savemat(file, columns | {"t": np.arange(200.0)[:, None] * dt})
+
+
+def test_the_official_clocks_of_emps_differ_by_jitter_and_are_accepted(made):
+    sample_pulses_every(made, 0.001 * (1 + 1.6e-5))
+    data = load("emps")
+    assert data.training.dt == 0.001
+    assert data.test[0].dt == pytest.approx(0.001 * (1 + 1.6e-5), rel=1e-12)
+
+
+def test_records_of_another_sampling_time_are_refused(made):
+    sample_pulses_every(made, 0.001 * (1 + 1e-3))
+    with pytest.raises(
+        UnusableInput, match=r"pulses: sampled every 0\.001001.* s, the first experiment every 0\.001 s"
+    ):
+        load("emps")
+
+
 def test_f16_is_read_from_its_files_without_the_odd_multisines(made):
     data = load("f16")
     assert [e.name for e in data.training.train] == ["F16Data_FullMSine_Level1", "F16Data_SineSw_Level1"]

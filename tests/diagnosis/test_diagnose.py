@@ -9,8 +9,8 @@ import pytest
 import simgap
 from simgap.data.simulated.gimbal.recordings import Gimbal, gimbal_dataset
 from simgap.data.simulated.rigs import hide, suitable
+from simgap.diagnosis.cases import Case, solve
 from simgap.diagnosis.diagnose import diagnose
-from simgap.diagnosis.recovery import Case, seek
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 # Twins of the design: what the data may not separate must at least be named as confounded.
@@ -33,9 +33,9 @@ def answers(diagnosis):
 
 
 @pytest.mark.parametrize("attempt", range(3))
-def test_an_effect_that_is_hidden_in_a_rig_is_named_first_if_an_oracle_can_see_it(attempt):
+def test_an_effect_that_is_hidden_in_a_rig_is_named_first_if_the_reference_can_see_it(attempt):
     rig, effect, seed = hidden_somewhere()
-    outcome = seek(Case(rig, effect, 1.0, noise=0.05, colour=0.0, seed=seed))
+    outcome = solve(Case(rig, effect, 1.0, noise=0.05, colour=0.0, seed=seed))
     assert outcome.right or not outcome.visible, outcome
 
 

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simgap.greybox import initial_states as states
-from simgap.greybox import noise, outliers, signal_scales
+from simgap.greybox import fitting, noise, outliers, signal_scales
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Problem
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
@@ -156,7 +155,7 @@ def own_numbers_of_each(made, data, weighing):
 
 def initial_states(made, data, weighing):
     """The states [E, q] at the first sample of each record."""
-    return states.initial_states(made.plant, made.theta, data.u, data.y, weighing)
+    return fitting.initial_states(made.plant, made.theta, data.u, data.y, weighing)
 
 
 # ------------------------------------------------------------------ what is seen before and after a search

@@ -42,7 +42,7 @@ def test_a_window_ends_one_sample_before_its_target_in_the_same_experiment(lengt
 
 def test_windows_share_the_memory_of_the_data():
     made, *_ = windows([500, 300], 40)
-    views, y = made.held
+    views, y = made.in_memory
     assert views.untyped_storage().nbytes() < 1.5 * y.untyped_storage().nbytes()
 
 

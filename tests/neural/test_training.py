@@ -94,10 +94,10 @@ def test_data_that_do_not_stay_in_memory_train_the_same_network(data, simulated)
 
 
 def test_l2_makes_weights_smaller(data):
-    free, punished = small(epochs=8), small(epochs=8, l2=0.02)
-    for model in (free, punished):
+    free, decayed = small(epochs=8), small(epochs=8, l2=0.02)
+    for model in (free, decayed):
         model.fit(data, 0)
-    size = [float(m.trained.body.layers[0].weight_ih_l0.detach().square().sum()) for m in (free, punished)]
+    size = [float(m.trained.body.layers[0].weight_ih_l0.detach().square().sum()) for m in (free, decayed)]
     assert size[1] < 0.8 * size[0]
 
 

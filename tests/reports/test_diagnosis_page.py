@@ -13,7 +13,7 @@ import pytest
 from simgap.findings import Gain, Trace
 from simgap.reports.diagnosis.figures import label
 from simgap.reports.diagnosis.page import diagnosis_page
-from simgap.reports.diagnosis.traces import chosen, shown_range, thinned
+from simgap.reports.diagnosis.traces import axis_range, choose, thin
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
 named, nothing_found, unexplained, hostile = (
@@ -142,7 +142,7 @@ def test_a_simulation_that_diverges_leaves_the_measurement_readable(named):
     huge = np.where(first.t[:, None] > 10, np.inf, first.y * 1e90)
     page = Page(diagnosis_page(replace(named, traces=(replace(first, before=huge),))))
     assert len(page.plots) == 1 + 1 + 2
-    assert shown_range(first.y[:, 0], [huge[:, 0]])[1] < 10 * np.abs(first.y).max()
+    assert axis_range(first.y[:, 0], [huge[:, 0]])[1] < 10 * np.abs(first.y).max()
 
 
 def test_a_page_without_experiments_and_views_is_whole(nothing_found):
@@ -155,31 +155,31 @@ def test_thinning_keeps_peaks_and_order_and_leaves_short_records_alone():
     t = np.arange(65_001.0)
     y = np.sin(t / 5000)
     y[40_123], y[50_321], y[7] = 9.0, -9.0, np.nan
-    kept, values = thinned(t, y, 2000)
+    kept, values = thin(t, y, 2000)
     assert len(kept) <= 2000
     assert np.all(np.diff(kept) > 0)
     assert kept[np.nanargmax(values)] == 40_123
     assert kept[np.nanargmin(values)] == 50_321
     np.testing.assert_array_equal(values, y[kept.astype(int)])
-    np.testing.assert_array_equal(thinned(t[:50], y[:50], 2000)[1], y[:50])
+    np.testing.assert_array_equal(thin(t[:50], y[:50], 2000)[1], y[:50])
 
 
 def test_what_is_not_finite_becomes_a_gap():
     y = np.concatenate([np.zeros(5000), np.full(5000, np.inf)])
-    values = thinned(np.arange(10_000.0), y, 100)[1]
+    values = thin(np.arange(10_000.0), y, 100)[1]
     assert not np.isinf(values).any()
     assert np.isnan(values[-25:]).all()
 
 
 def test_the_experiments_shown_are_the_most_improved_a_middling_and_the_worst(named):
-    reasons = {trace.experiment: why for trace, why in chosen(named.traces, True)}
+    reasons = {trace.experiment: why for trace, why in choose(named.traces, True)}
     assert reasons["test_1"].startswith("improved most")
     assert len(reasons) == 3
     worse = replace(named.traces[2], after=named.traces[2].y + np.inf)
     many = [*named.traces, *named.traces[:2], worse]
-    assert chosen(many, True)[-1] == (worse, "largest error left")
-    assert chosen(named.traces[:1], True) == [(named.traces[0], "the only test experiment")]
-    assert chosen([], False) == []
+    assert choose(many, True)[-1] == (worse, "largest error left")
+    assert choose(named.traces[:1], True) == [(named.traces[0], "the only test experiment")]
+    assert choose([], False) == []
 
 
 def test_plotting_libraries_are_loaded_only_for_a_page():

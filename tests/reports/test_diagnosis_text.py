@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from simgap.findings import Value
-from simgap.reports.diagnosis.numbers import interval, number, numbers, percent
+from simgap.reports.diagnosis.numbers import interval, numbers
 from simgap.reports.diagnosis.text import diagnosis_text
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
@@ -143,11 +143,3 @@ def test_an_estimate_has_the_digits_that_its_interval_deserves(estimate, shown):
 
 def test_a_parameter_that_was_not_estimated_has_no_interval():
     assert interval(Value("mid level", "V", 6.5, 6.5, 6.5)) == "read off the data, not estimated"
-
-
-def test_numbers_have_three_digits_and_are_not_rounded_before_the_point():
-    assert [number(v) for v in (0.0, 0.0012345, 0.6075, 26.78, 1234.5)] == ["0", "0.00123", "0.608", "26.8", "1234"]
-
-
-def test_percents_show_what_lacks_to_everything():
-    assert [percent(v) for v in (0.0, 0.004, 0.613, 0.9968, 1.0)] == ["0 %", "less than 1 %", "61 %", "99.7 %", "100 %"]

@@ -21,7 +21,9 @@ GROWTH = (0.0, 0.2, -0.2, 0.1)  # of the RMSE of a network from seed to seed
 
 def result(model, rmse, seed=0, experiment="test", **changes):
     metrics = {"y": {"rmse": rmse, "std": 2.0, "n_scored": 9, "rmse_by_horizon": {"1": rmse / 10}}}
-    return replace(Result(model, {}, "toy", experiment, "free_run", seed, "ok", metrics=metrics), **changes)
+    provenance = {"stochastic": model == "gru"}
+    row = Result(model, {}, "toy", experiment, "free_run", seed, "ok", metrics=metrics, provenance=provenance)
+    return replace(row, **changes)
 
 
 def verdicts(before, after, suite="smoke"):
@@ -47,6 +49,28 @@ def test_a_model_that_computes_may_grow_by_a_millionth(factor, verdict):
 @pytest.mark.parametrize(("factor", "verdict"), [(1.04, "same"), (1.06, "worse"), (0.9, "better")])
 def test_a_network_with_one_seed_may_grow_by_five_percent(factor, verdict):
     assert verdicts([result("gru", 0.5)], [result("gru", 0.5 * factor)])["test, free_run, y", 0] == verdict
+
+
+def test_a_network_of_somebodys_own_may_grow_too_in_a_suite_that_nobody_knows():
+    before, after = (result("mine", rmse, provenance={"stochastic": True}) for rmse in (0.5, 0.52))
+    assert set(verdicts([before], [after], suite="theirs").values()) == {"same"}
+    older = replace(before, provenance={})  # a reference from before models declared it
+    assert set(verdicts([older], [after], suite="theirs").values()) == {"same"}
+    assert set(verdicts([replace(before, provenance={"stochastic": False})], [after]).values()) == {"worse"}
+
+
+@pytest.mark.parametrize(
+    ("model", "params", "declared"),
+    [
+        ("arx", {}, False),
+        ("gru", {"epochs": 1, "batches": 1}, True),
+        ("delta", {"model": "gru", "params": {"epochs": 1, "batches": 1}}, True),
+        ("delta", {}, False),
+    ],
+)
+def test_a_row_says_whether_its_model_is_stochastic(model, params, declared):
+    rows = simgap.fit(model, "gimbal_short", params).results
+    assert {row.provenance["stochastic"] for row in rows} == {declared}
 
 
 def test_a_network_may_grow_by_three_sigma_of_its_seeds():

@@ -1,13 +1,16 @@
 import math
 import multiprocessing
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from simgap.records import Result, UnusableInput
 from simgap.results import store
+from simgap.results.decoding import StoredRow, decode
 
 RESULT = Result(
     model="arx", params={"na": 2}, dataset="tanks", experiment="test", task="free_run", seed=0,
@@ -85,6 +88,11 @@ def test_a_last_line_without_its_line_break_still_counts(tmp_path):
         (('"n_scored": 9', '"n_scored": "many"'), "metric 'n_scored'"),
         (('"n_scored": 9', '"n_scored": NaN'), "NaN is not JSON"),
         (('"metrics": {"y": {', '"metrics": {"z": 1, "y": {'), "metrics of an output"),
+        (('"rmse": "inf", ', ""), "lack the number rmse"),
+        (('"1": 0.1', '"1": "far"'), "the metric '1' is 'far', which is no number"),
+        (('"n_params": 4', '"n_params": ' + "9" * 400), "n_params is larger than it can be"),
+        (('"n_scored": 9', '"n_scored": 1e999'), "out of range"),
+        (('"y": "°"', '"y": 3'), "the units of outputs are texts"),
         (('{"model"', '[{"model"'), "no line of results"),
         (('{"model"', "[" * 100_000), "no line of results"),
     ],
@@ -96,6 +104,21 @@ def test_a_bad_line_is_refused_with_file_and_line(tmp_path, change, complaint):
         store.read(path)
     assert str(refusal.value).startswith(f"{path}, line 2: ")
     assert complaint in str(refusal.value)
+
+
+def test_the_fields_of_a_line_are_those_of_a_result():
+    assert list(StoredRow.__struct_fields__) == [field.name for field in fields(Result)]
+    defaults = Result("m", {}, "d", "e", "t", 0, "ok")
+    assert decode(store.encode(defaults).encode(), "line 1") == defaults
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
+def test_numbers_come_back_to_the_bit_and_of_their_type(number):
+    row = replace(RESULT, metrics={"y": {"rmse": 1.0, "mae": number}}, fitted={"value": number})
+    line = store.encode(row)
+    back = decode(line.encode(), "line 1")
+    assert (repr(back.metrics["y"]["mae"]), repr(back.fitted["value"])) == (repr(number), repr(number))
+    assert store.encode(back) == line
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "a/b\\c", "..", "C:x", ".hidden", "ARX(3,2,1)", "", "x\n"])

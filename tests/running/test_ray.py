@@ -72,6 +72,23 @@ def test_without_a_cluster_the_run_is_refused(suite, tmp_path, capfd):
         assert line.startswith(f"simgap: --engine ray: there is no cluster at {wrong}: ")
 
 
+def test_the_cases_of_the_recovery_study_run_on_a_cluster_as_on_one_machine(tmp_path):
+    from dataclasses import replace
+
+    from simgap.diagnosis.recovery import CaseJob, Grid, recovery
+    from simgap.running.engines import ray as engine
+    from simgap.running.execution import Execution
+    from simgap.running.workers import Limits
+
+    grid = Grid(rigs=("cart",), seeds=0, pairs=1, clean=1)
+    alone = recovery(grid, Execution(out=tmp_path / "here"))
+    with cluster({"num_cpus": 1}) as (nodes, _):
+        spread = recovery(grid, Execution("ray", options={"address": nodes.address}, out=tmp_path / "there"))
+    assert [replace(row, seconds=0.0) for row in spread] == [replace(row, seconds=0.0) for row in alone]
+    (row,) = engine._on_a_node(CaseJob(alone[0].case, "0" * 64), Limits(1))
+    assert "another version of the code" in row.message
+
+
 def test_a_node_with_other_code_of_the_model_says_so(suite, tmp_path, example):
     from dataclasses import replace
 
@@ -86,7 +103,7 @@ def test_a_node_with_other_code_of_the_model_says_so(suite, tmp_path, example):
     (job,) = planning.plan(chosen, chosen.models, data, provenance(1))
     other = replace(job, provenance=job.provenance | {"model_sha256": "0" * 64})
     rows = engine._on_a_node(other, Limits(1))
-    assert {row.message for row in rows} == {"this node of the cluster has another version of the model's code"}
+    assert {row.message for row in rows} == {"this node of the cluster has another version of the code"}
 
 
 def test_ray_missing_is_said_in_one_sentence(suite, tmp_path, monkeypatch):

@@ -37,6 +37,37 @@ def test_the_paper_has_twenty_networks_and_four_classical_models():
     assert all(entry.name == "delta" for entry in delta)
 
 
+NETWORKS = ("conv1d", "decoder", "encoder", "gru", "inception", "inception_regularised", "lstm", "srnn", "tcn", "tcns")
+
+
+def test_the_groups_of_full_and_smoke_are_the_tables_that_stood_there():
+    windowed = {"mode": "windowed", "epochs": 15, "batches": 40, "learning_rate": 0.001}
+    assert load_suite("full").models == (
+        *(Entry(name) for name in MODELS), *(Entry(name, windowed, f"{name} windowed") for name in NETWORKS)
+    )  # fmt: skip
+    assert load_suite("smoke").models == (
+        *(Entry(name) for name in MODELS if name not in NETWORKS),
+        Entry("arx", {"na": 3, "nb": 2, "nk": 1}, "ARX321"),
+        *(Entry(name, {"epochs": 3, "batches": 10}) for name in NETWORKS),
+    )
+
+
+def test_a_group_stands_for_one_table_per_name(tmp_path):
+    text = """
+    [groups]
+    mine = ["arx", "my_model.py:Mine"]
+    [[models]]
+    group = "mine"
+    label = "{name} on GPU"
+    gpus = 0.5
+    """
+    (tmp_path / "my_model.py").touch()
+    entries = load_suite(written(tmp_path, text)).models
+    assert [(entry.name, entry.label, entry.gpus) for entry in entries] == [
+        ("arx", "arx on GPU", 0.5), (f"{tmp_path / 'my_model.py'}:Mine", "Mine on GPU", 0.5)
+    ]  # fmt: skip
+
+
 def test_a_user_writes_a_suite_with_labels_and_parameters(tmp_path):
     text = """
     datasets = ["gimbal"]
@@ -92,6 +123,15 @@ def test_paths_in_a_suite_count_from_its_file(tmp_path):
         ('[[models]]\nlabel = "x"', "needs a name"),
         ('[[models]]\nname = "arx"\nparams = 3', "needs a name"),
         ('[[models]]\nname = "arx"\nparam = {}', "unknown key 'param'"),
+        ("groups = 1", "groups must be a table"),
+        ('[groups]\na = "arx"\n[[models]]\ngroup = "a"', "the group a must be a list of names"),
+        ('[groups]\na = []\n[[models]]\ngroup = "a"', "the group a must be a list of names"),
+        ('[groups]\na = ["all"]\n[[models]]\ngroup = "a"', "the group a cannot hold all"),
+        ('[[models]]\ngroup = "a"', "there is no group 'a'; known are none"),
+        ('[groups]\na = ["arx"]\n[[models]]\ngroup = ["a"]', "there is no group ['a']; known are a"),
+        ('[groups]\na = ["arx"]\n[[models]]\ngroup = "a"\nname = "arx"', "a name or a group, not both"),
+        ('[groups]\na = ["arx"]\n[[models]]\ngroup = "a"\nlabel = "x"', "needs {name} in it"),
+        ('[groups]\na = ["arx"]\n[[models]]\ngroup = "a"\nparam = {}', "unknown key 'param'"),
     ],
 )
 def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):

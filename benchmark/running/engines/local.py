@@ -1,4 +1,4 @@
-"""Jobs on this machine, each in a process of its own that ends with it."""
+"""Work on this machine, each piece in a process of its own that ends with it."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
 from multiprocessing.context import BaseContext
-from pathlib import Path
+from typing import Any
 
 from pebble import CONSTS, ProcessExpired, ProcessPool
 
-from simgap.records import Result
-from simgap.registry import MODELS
-from simgap.running.engines.engine import Event, Running
-from simgap.running.jobs import Job, execute, progress_file
-from simgap.running.workers import Limits, prepare_worker
+from simgap.protocol import listen
+from simgap.registry import ENGINES
+from simgap.running.engines.engine import Event, Running, Work, note_progress, noted_share, shared_folder
+from simgap.running.workers import Limits, prepare_worker, threads_per_worker
 
 # Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
-# changed since, and a job imports them in milliseconds. torch._dynamo is what the first step of an optimiser imports.
+# changed since, and a job imports them in milliseconds.
 PRELOADED = (
     "simgap.running.jobs",
     "simgap.running.engines.preloading",
@@ -31,20 +30,25 @@ PRELOADED = (
     "scipy.optimize",
     "scipy.stats",
 )
-PRELOADED_FOR_NETWORKS = ("torch", "torch._dynamo", "safetensors.torch")
 
 # Seconds between two looks of the pool at its processes, of which every job needs a new one.
 CONSTS.sleep_unit = 0.02
 
 
+@ENGINES.register("local")
 @dataclass(frozen=True)
 class Local:
-    """At most `workers` jobs at a time."""
+    """This machine: at most `workers` pieces of work at a time, each in a process of its own."""
 
     workers: int
     limits: Limits
 
-    def __call__(self, todo: Sequence[Job]) -> Generator[Event, None, None]:
+    @staticmethod
+    def threads(workers: int) -> int:
+        """Each worker's share of the machine."""
+        return threads_per_worker(workers)
+
+    def __call__(self, todo: Sequence[Work]) -> Generator[Event, None, None]:
         """Rows and what is under way; see Engine."""
         if not todo:
             return
@@ -55,50 +59,46 @@ class Local:
                                initargs=(limits,), context=_context(todo))  # fmt: skip
             stack.callback(pool.join)
             stack.callback(pool.stop)  # runs before join, and after Ctrl-C too
-            pending: dict[Future, Job] = {pool.schedule(execute, (job,), timeout=limits.timeout): job for job in todo}
+            pending: dict[Future, Work] = {
+                pool.schedule(_execute, (work,), timeout=limits.timeout): work for work in todo
+            }
             while pending:
                 ended, _ = wait(pending, timeout=0.3, return_when=FIRST_COMPLETED)
                 for future in ended:
-                    yield _outcome(future, pending.pop(future), limits)
+                    yield _rows_of(future, pending.pop(future), limits)
                 yield tuple(
-                    Running(job, _share(progress_file(notes, job)))
-                    for future, job in pending.items()
-                    if future.running()
+                    Running(work, noted_share(notes, work)) for future, work in pending.items() if future.running()
                 )
 
 
-def _context(todo: Sequence[Job]) -> BaseContext:
-    """Forked from a process that has imported what the models need, but has done nothing yet; else started anew."""
+def _execute(work: Work) -> list[Any]:
+    """Runs in the process of the work."""
+    if (folder := shared_folder()) is not None:
+        listen(lambda done, total: note_progress(folder, work, done, total))
+    return work.execute()
+
+
+def _context(todo: Sequence[Work]) -> BaseContext:
+    """Forked from a process that has imported what the work needs, but has done nothing yet; else started anew."""
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    named = {str(name) for job in todo for name in (job.entry.name, *job.entry.params.values())}
-    networks = any(MODELS.module(name).startswith("simgap.neural.") for name in named)
-    context.set_forkserver_preload([*PRELOADED, *(PRELOADED_FOR_NETWORKS if networks else ())])
+    context.set_forkserver_preload(list(dict.fromkeys([*PRELOADED, *(name for work in todo for name in work.preload)])))
     return context
 
 
-def _share(file: Path) -> float:
-    """How far a worker says that its job is; zero if it says nothing."""
-    try:
-        done, total = map(int, file.read_text(encoding="ascii").split())
-        return min(1.0, done / total)
-    except (OSError, ValueError, ZeroDivisionError):
-        return 0.0
-
-
-def _outcome(future: Future, job: Job, limits: Limits) -> list[Result]:
-    """The rows of a job that has ended, however it ended."""
+def _rows_of(future: Future, work: Work, limits: Limits) -> list[Any]:
+    """The rows of work that has ended, however it ended."""
     match future.exception():
         case None:
             return future.result()
         case TimeoutError():
             text = f"no result after {limits.timeout:g} s; raise the suite's timeout or give the model less to do"
-            return job.failed("timeout", text)
+            return work.failed("timeout", text)
         case ProcessExpired() as error:
-            return job.failed("error", f"the worker process {_how_it_ended(error.exitcode)}")
+            return work.failed("error", f"the worker process {_how_it_ended(error.exitcode)}")
         case error:
-            return job.failed("error", f"the worker failed: {type(error).__name__}: {error}")
+            return work.failed("error", f"the worker failed: {type(error).__name__}: {error}")
 
 
 def _how_it_ended(exitcode: int | None) -> str:

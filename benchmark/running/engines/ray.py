@@ -1,4 +1,4 @@
-"""Jobs on a Ray cluster: the same jobs, the same rows."""
+"""Work on a Ray cluster: the same work, the same rows."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from simgap.records import Result, UnusableInput
-from simgap.running.engines.engine import Event
+from simgap.records import UnusableInput
+from simgap.registry import ENGINES
+from simgap.running.engines.engine import Event, Work
 from simgap.running.engines.local import Local
-from simgap.running.jobs import Job, model_sha256
 from simgap.running.workers import Limits
 
 # How often a job is tried again because its node went away; what the model does is a row and is not tried again.
@@ -24,18 +24,24 @@ PATIENCE = 10.0  # seconds, for an answer of the cluster
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 
 
+@ENGINES.register("ray")
 @dataclass(frozen=True)
 class Cluster:
-    """As many jobs at a time as the cluster at `address` has processors and, where models ask for them, GPUs.
+    """A Ray cluster: as many jobs at a time as it has processors and, where models ask for them, GPUs.
 
-    Every node needs simgap and the same files under the same names. Raises UnusableInput when there is no cluster.
+    `workers` is ignored. `address` is that of the cluster, or in RAY_ADDRESS. Every node needs simgap and the same
+    files under the same names. Raises UnusableInput, before any work is done, when Ray is missing or nobody answers.
     """
 
+    workers: int
     limits: Limits
-    address: str
+    address: str = ""
 
     def __post_init__(self) -> None:
-        """Raises UnusableInput, before any work is done, when Ray is missing or nobody answers at the address."""
+        if not self.address:
+            object.__setattr__(self, "address", os.environ.get("RAY_ADDRESS", ""))
+        if not self.address:
+            raise UnusableInput("--engine ray: say where the cluster is: --address HOST:PORT")
         try:
             import ray  # type: ignore[import-not-found]  # noqa: F401
         except ImportError as error:
@@ -47,7 +53,12 @@ class Cluster:
             except (OSError, ValueError) as error:
                 raise UnusableInput(f"--engine ray: there is no cluster at {self.address}: {error}") from error
 
-    def __call__(self, todo: Sequence[Job]) -> Generator[Event, None, None]:
+    @staticmethod
+    def threads(workers: int) -> int:
+        """One processor for each job."""
+        return 1
+
+    def __call__(self, todo: Sequence[Work]) -> Generator[Event, None, None]:
         """Rows as they come; what is under way is Ray's to tell."""
         if not todo:
             return
@@ -55,31 +66,31 @@ class Cluster:
 
         with _connected(ray, self.address):
             task = ray.remote(num_cpus=self.limits.threads, max_retries=RETRIES)(_on_a_node)
-            waiting = [_with_absolute_paths(job) for job in reversed(todo)]
+            waiting = [work.portable() for work in reversed(todo)]
             at_once = max(8, int(AHEAD * ray.cluster_resources().get("CPU", 1)))
-            pending: dict[Any, Job] = {}
+            pending: dict[Any, Work] = {}
             try:
                 while waiting or pending:
                     while waiting and len(pending) < at_once:
-                        job = waiting.pop()
-                        pending[task.options(num_gpus=job.entry.gpus).remote(job, self.limits)] = job
+                        work = waiting.pop()
+                        pending[task.options(num_gpus=work.gpus).remote(work, self.limits)] = work
                     ended, _ = ray.wait(list(pending), timeout=0.5)
                     for reference in ended:
-                        yield _outcome(ray, reference, pending.pop(reference))
+                        yield _rows_of(ray, reference, pending.pop(reference))
                     yield ()
             finally:
                 for reference in pending:
                     ray.cancel(reference, force=True)
 
 
-def _on_a_node(job: Job, limits: Limits) -> list[Result]:
-    """Runs on the cluster: one job in a process of its own, as on one machine."""
-    if model_sha256(job.entry) != job.provenance["model_sha256"]:
-        return job.failed("error", "this node of the cluster has another version of the model's code")
+def _on_a_node(work: Work, limits: Limits) -> list[Any]:
+    """Runs on the cluster: one piece of work in a process of its own, as on one machine."""
+    if not work.has_its_code():
+        return work.failed("error", "this node of the cluster has another version of the code")
     environment = {name: path for name, path in limits.environment.items() if Path(path).parent.is_dir()}
     if VISIBLE in os.environ:
         environment[VISIBLE] = os.environ[VISIBLE]  # the GPU, or the part of it, that Ray gives to this job
-    events = Local(1, replace(limits, environment=environment))([job])
+    events = Local(1, replace(limits, environment=environment))([work])
     with contextlib.closing(events):
         return next(event for event in events if isinstance(event, list))
 
@@ -100,19 +111,10 @@ def _connected(ray: Any, address: str) -> Iterator[None]:
         ray.shutdown()
 
 
-def _outcome(ray: Any, reference: Any, job: Job) -> list[Result]:
+def _rows_of(ray: Any, reference: Any, work: Work) -> list[Any]:
     try:
-        rows: list[Result] = ray.get(reference)
+        rows: list[Any] = ray.get(reference)
     except ray.exceptions.RayError as error:
         text = " ".join(str(error).split())[:300]
-        return job.failed("error", f"the cluster lost this job: {type(error).__name__}: {text}")
+        return work.failed("error", f"the cluster lost this job: {type(error).__name__}: {text}")
     return rows
-
-
-def _with_absolute_paths(job: Job) -> Job:
-    """A process on a node starts in another folder."""
-    file, colon, name = job.entry.name.rpartition(":")
-    entry = replace(job.entry, name=f"{Path(file).absolute()}:{name}") if colon else job.entry
-    data = Path(job.source.data)
-    source = replace(job.source, data=str(data.absolute())) if data.exists() else job.source
-    return replace(job, entry=entry, source=source)

@@ -14,22 +14,22 @@ BINARY_LEVEL = 4.5  # V
 
 
 def gaussian(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """White noise with a Gaussian distribution, cut off at the limit. V."""
+    """Draw white noise with a Gaussian distribution, cut off at the limit. V."""
     return np.clip(rng.normal(0.0, GAUSSIAN_STD, samples), -LIMIT, LIMIT)
 
 
 def binary(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """One of two levels of opposite sign, drawn anew for every sample. V."""
+    """Draw one of two levels of opposite sign, anew for every sample. V."""
     return BINARY_LEVEL * rng.choice(np.array([-1.0, 1.0]), samples)
 
 
 def uniform(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Every voltage within the limit equally likely. V."""
+    """Draw voltages of which every one within the limit is equally likely. V."""
     return rng.uniform(-LIMIT, LIMIT, samples)
 
 
 def joystick(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Pushes of a hand on a stick: up smoothly, held, back smoothly, often to the other side, with pauses. V.
+    """Draw pushes of a hand on a stick: up smoothly, held, back smoothly, often to the other side, with pauses. V.
 
     During a pause the stick stands in its centre and the voltage is exactly zero.
     """

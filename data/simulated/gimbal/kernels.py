@@ -62,7 +62,7 @@ def volts(drive, t):
 
 @njit(cache=True)
 def net_torque(plant, drive, t, phi, v, z):
-    """All torques but dry friction, N m."""
+    """Sum all torques but dry friction. N m."""
     torque = plant.gain * volts(drive, t) - plant.damping * v - plant.load - plant.drag * v * abs(v)
     torque -= phi * (plant.stiffness + phi * (plant.stiffness2 + phi * plant.stiffness3))
     torque -= plant.hysteresis * z
@@ -75,7 +75,7 @@ def net_torque(plant, drive, t, phi, v, z):
 
 @njit(cache=True)
 def dry_friction(plant, v):
-    """Size of the friction torque of a moving body; at v = 0 the breakaway torque. N m."""
+    """Compute the size of the friction torque of a moving body; at v = 0 the breakaway torque. N m."""
     friction = plant.coulomb
     if plant.stribeck != 0.0:
         friction += plant.stribeck * exp(-((v / plant.stribeck_velocity) ** 2))
@@ -84,7 +84,7 @@ def dry_friction(plant, v):
 
 @njit(cache=True)
 def rates(plant, drive, direction, t, phi, v, z):
-    """d/dt of (phi, v, z). z in [-1, 1] is Bouc-Wen's state: z' = (v - |v| z / 2 - v |z| / 2) / width."""
+    """Compute d/dt of (phi, v, z). z in [-1, 1] is Bouc-Wen's state: z' = (v - |v| z / 2 - v |z| / 2) / width."""
     torque = net_torque(plant, drive, t, phi, v, z) - direction * dry_friction(plant, v)
     dz = 0.0
     if plant.hysteresis != 0.0:
@@ -94,7 +94,7 @@ def rates(plant, drive, direction, t, phi, v, z):
 
 @njit(cache=True)
 def slide(plant, drive, direction, t, h, phi, v, z):
-    """One Runge-Kutta step of order 4 over h seconds with the direction of friction held."""
+    """Take a Runge-Kutta step of order 4 over h seconds with the direction of friction held."""
     p1, v1, z1 = rates(plant, drive, direction, t, phi, v, z)
     p2, v2, z2 = rates(plant, drive, direction, t + h / 2, phi + h / 2 * p1, v + h / 2 * v1, z + h / 2 * z1)
     p3, v3, z3 = rates(plant, drive, direction, t + h / 2, phi + h / 2 * p2, v + h / 2 * v2, z + h / 2 * z2)
@@ -108,7 +108,7 @@ def slide(plant, drive, direction, t, h, phi, v, z):
 
 @njit(cache=True)
 def slide_to_rest(plant, drive, direction, t, h, phi, v, z):
-    """The state where the velocity, which changes sign within h, is zero, and the time that it took."""
+    """Find the state where the velocity, which changes sign within h, is zero, and the time that it took."""
     low, v_low, high = 0.0, v, h
     v_high = slide(plant, drive, direction, t, h, phi, v, z)[1]
     middle = h
@@ -125,7 +125,7 @@ def slide_to_rest(plant, drive, direction, t, h, phi, v, z):
 
 @njit(cache=True)
 def advance(plant, drive, t, h, phi, v, z):
-    """The state h seconds later, with sticking."""
+    """Move the state on by h seconds, with sticking."""
     if plant.coulomb + plant.stribeck == 0.0:
         return slide(plant, drive, 0.0, t, h, phi, v, z)
     done = 0.0
@@ -146,7 +146,7 @@ def advance(plant, drive, t, h, phi, v, z):
 
 @njit(cache=True)
 def integrate(plant, u, dt, records, substeps, delay, lag, fade):
-    """Motion [T * records, 2] of (phi, phi') from rest, `records` rows to each of the T inputs held for dt.
+    """Integrate (phi, phi') [T * records, 2] from rest, `records` rows to each of the T inputs held for dt.
 
     u [T] V, delay in steps of dt / (records * substeps), lag in s, fade the share of the gain lost at the
     end. phi' is the velocity of the row's instant, before the input of that instant takes effect.
@@ -172,7 +172,7 @@ def integrate(plant, u, dt, records, substeps, delay, lag, fade):
 
 @njit(cache=True)
 def play(u, width):
-    """Backlash: the output [T] follows u [T] only where u leaves a gap of the given width around it."""
+    """Pass u [T] through backlash: the output [T] follows only where u leaves a gap of the given width around it."""
     played = np.empty_like(u)
     last = 0.0
     for k in range(len(u)):

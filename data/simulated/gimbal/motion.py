@@ -20,7 +20,7 @@ SUBSTEPS = 10  # integration steps to a measurement: 2 kHz
 def simulate_gimbal(
     parameters: Gimbal, u: Float[np.ndarray, "T 1"], rng: Generator, substeps: int = SUBSTEPS
 ) -> Float[np.ndarray, "T 2"]:
-    """Measured y [T, 2] = (phi, phi_dot) in deg and deg/s, from rest; y[k] is read before u[k] takes effect.
+    """Measure y [T, 2] = (phi, phi_dot) in deg and deg/s, from rest; y[k] is read before u[k] takes effect.
 
     u [T, 1] V is held for 0.1 s, the motion integrated in `substeps` steps per 5 ms, measured at 200 Hz, and
     every 20th measurement kept. Each source of chance has a stream of its own, spawned from `rng`.
@@ -35,7 +35,7 @@ def simulate_gimbal(
 
 
 def _drive(parameters: Gimbal, u: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
-    """Voltage at the motor, before delay and lag: gap, dead zone, gain, limit. All keep a held input held."""
+    """Compute the motor's voltage before delay and lag: gap, dead zone, gain, limit; a held input stays held."""
     u = play(u, parameters.backlash)
     u = np.sign(u) * np.maximum(np.abs(u) - parameters.dead_zone, 0.0)
     u = u * np.where(u > 0, 1 + parameters.asymmetric_gain, 1 - parameters.asymmetric_gain)

@@ -65,7 +65,7 @@ class Gimbal:
 
     @classmethod
     def linear(cls, **changes: Any) -> Gimbal:
-        """The same gimbal with everything off that a linear model of order 2 and white noise do not cover."""
+        """Make a gimbal with everything off that a linear model of order 2 and white noise do not cover."""
         off = {
             "coulomb": 0.0,
             "position_torque": 0.0,

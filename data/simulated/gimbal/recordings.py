@@ -78,7 +78,7 @@ def gimbal_dataset(
     n_init: int = 40,
     name: str = "gimbal",
 ) -> Dataset:
-    """Recordings of a gimbal with the given parameters; `seconds` are the lengths in train, valid and test.
+    """Record a gimbal with the given parameters; `seconds` are the lengths in train, valid and test.
 
     Inputs and noise follow from `seed` alone: parameters that differ give the same experiments, otherwise
     measured. Names such as `s1_003_binary` carry session, running number and kind of input.
@@ -94,7 +94,7 @@ def gimbal_dataset(
 
 
 def _plan(counts: Sequence[int]) -> list[Planned]:
-    """All experiments in the order in which they are made, session after session."""
+    """List all experiments in the order in which they are made, session after session."""
     plan = []
     for split, count in enumerate(counts):
         made = [0, 0, 0]

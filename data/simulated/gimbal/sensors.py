@@ -15,7 +15,7 @@ KEPT_EVERY = 0.1  # s; the noise's colour is stated between samples this far apa
 def measure(
     parameters: Gimbal, motion: Float[np.ndarray, "n 2"], dt: float, rng: Generator
 ) -> Float[np.ndarray, "n 2"]:
-    """Readings of (phi, phi_dot), [n, 2] in deg and deg/s every dt seconds.
+    """Read (phi, phi_dot), [n, 2] in deg and deg/s every dt seconds.
 
     reading = outliers(round(clip(abs(lagged motion + bias + drift t + noise))))
 
@@ -39,7 +39,7 @@ def measure(
 
 
 def _lag(motion: Float[np.ndarray, "n 2"], lags: tuple[float, float], dt: float) -> Float[np.ndarray, "n 2"]:
-    """lag x' + x = motion from x = motion[0] = 0, exact where the motion is straight between its rows."""
+    """Solve lag x' + x = motion from x = motion[0] = 0, exactly where the motion is straight between its rows."""
     lagged = motion.copy()
     for channel, lag in enumerate(lags):
         if lag > 0:
@@ -50,7 +50,7 @@ def _lag(motion: Float[np.ndarray, "n 2"], lags: tuple[float, float], dt: float)
 
 
 def _noise(samples: int, colour: float, dt: float, rng: Generator) -> Float[np.ndarray, "n 2"]:
-    """Stationary AR(1) noise of variance 1 whose correlation over KEPT_EVERY seconds is `colour`."""
+    """Draw stationary AR(1) noise of variance 1 whose correlation over KEPT_EVERY seconds is `colour`."""
     noise = rng.standard_normal((samples, 2))  # [n, 2]
     keep = colour ** (dt / KEPT_EVERY)
     noise[1:] *= np.sqrt(1 - keep**2)

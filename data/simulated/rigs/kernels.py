@@ -75,7 +75,7 @@ class Tanks(NamedTuple):
 
 
 def floats(kind):
-    """The compiler's type of a named tuple of floats."""
+    """Give the compiler's type of a named tuple of floats."""
     return types.NamedUniTuple(types.float64, len(kind._fields), kind)
 
 
@@ -86,7 +86,7 @@ RECORD = (floats(Drive), ROWS, ROWS, FLOAT, FLOAT, FLOAT, types.int64)
 
 @njit(cache=True)
 def arriving(drive, u, dt, substeps):
-    """w [T substeps, 3] at the begin, the middle and the end of each substep, over which only the lag moves it."""
+    """Compute w [T substeps, 3] at the begin, middle and end of each substep, over which only the lag moves it."""
     steps, h = len(u) * substeps, dt / substeps
     shift = round(drive.delay / h)
     w = np.empty((steps, 3))
@@ -110,7 +110,7 @@ def arriving(drive, u, dt, substeps):
 
 @njit(cache=True)
 def friction(p, v):
-    """Size of the dry friction of a moving body, and at v = 0 the force at which it breaks away."""
+    """Compute the size of the dry friction of a moving body; at v = 0 the force at which it breaks away."""
     size = p.coulomb
     if p.stribeck != 0.0:
         size += p.stribeck * (1.0 + (p.breakaway - 1.0) * exp(-((v / p.stribeck_velocity) ** 2)))
@@ -119,7 +119,7 @@ def friction(p, v):
 
 @njit(cache=True)
 def force(p, w, other, t, x, v, z):
-    """All forces but dry friction; w and `other`, a force from outside, are those of the time t."""
+    """Sum all forces but dry friction; w and `other`, a force from outside, are those of the time t."""
     total = other + p.load - v * (p.damping + p.drag * abs(v)) - p.hysteresis * z
     total -= x * (p.stiffness + x * (p.stiffness2 + x * p.stiffness3))
     total += p.push * v * (1.0 - (x / p.push_width) ** 2)
@@ -135,14 +135,14 @@ def force(p, w, other, t, x, v, z):
 
 @njit(cache=True)
 def rates(p, w, other, side, t, x, v, z):
-    """d/dt of (x, v, z); z in [-1, 1] is Bouc-Wen's state: z' = (v - |v| z / 2 - v |z| / 2) / width."""
+    """Compute d/dt of (x, v, z); z in [-1, 1] is Bouc-Wen's state: z' = (v - |v| z / 2 - v |z| / 2) / width."""
     dz = (v - 0.5 * abs(v) * z - 0.5 * v * abs(z)) / p.hysteresis_width
     return v, force(p, w, other, t, x, v, z) - side * friction(p, v), dz
 
 
 @njit(cache=True)
 def glide(p, w, other, side, t, h, x, v, z):
-    """A Runge-Kutta step of order 4 with the side of dry friction held; w, other: begin, middle, end."""
+    """Take a Runge-Kutta step of order 4 with the side of dry friction held; w, other: begin, middle, end."""
     x1, v1, z1 = rates(p, w[0], other[0], side, t, x, v, z)
     x2, v2, z2 = rates(p, w[1], other[1], side, t + h / 2, x + h / 2 * x1, v + h / 2 * v1, z + h / 2 * z1)
     x3, v3, z3 = rates(p, w[1], other[1], side, t + h / 2, x + h / 2 * x2, v + h / 2 * v2, z + h / 2 * z2)
@@ -154,7 +154,7 @@ def glide(p, w, other, side, t, h, x, v, z):
 
 @njit(cache=True)
 def step_body(p, w, other, t, h, x, v, z):
-    """(x, v, z) after h seconds, with sticking."""
+    """Move (x, v, z) on by h seconds, with sticking."""
     breakaway = friction(p, 0.0)
     if breakaway == 0.0:
         return glide(p, w, other, 0.0, t, h, x, v, z)
@@ -179,7 +179,7 @@ def step_body(p, w, other, t, h, x, v, z):
 
 @njit(cache=True)
 def outside(other, step, substeps):
-    """What comes from outside at the begin, the middle and the end of a substep, from its values at the samples."""
+    """Interpolate what comes from outside at the begin, middle and end of a substep, from its values at the samples."""
     k, share = step // substeps, (step % substeps) / substeps
     begin = other[k] + (other[k + 1] - other[k]) * share
     half = (other[k + 1] - other[k]) / (2 * substeps)
@@ -188,7 +188,7 @@ def outside(other, step, substeps):
 
 @njit(types.float64[:, ::1](floats(Body), *RECORD), cache=True)
 def move(p, drive, u, other, x, v, dt, substeps):
-    """(x, v) [T substeps, 2] under the input u [T] and a force `other` [T + 1], straight between samples."""
+    """Integrate (x, v) [T substeps, 2] under the input u [T] and a force `other` [T + 1], straight between samples."""
     h = dt / substeps
     w = arriving(drive, u, dt, substeps)
     motion = np.empty((len(u) * substeps, 2))
@@ -201,14 +201,14 @@ def move(p, drive, u, other, x, v, dt, substeps):
 
 @njit(cache=True)
 def leaving(p, rate, level, reference):
-    """What runs out of a tank: both laws agree at the reference level."""
+    """Compute what runs out of a tank: both laws agree at the reference level."""
     level = max(level, 0.0)
     return rate * ((1.0 - p.root) * level + p.root * sqrt(level * reference))
 
 
 @njit(cache=True)
 def flows(p, w, other, t, lower, upper):
-    """d/dt of the two levels below the rim."""
+    """Compute d/dt of the two levels below the rim."""
     inflow = p.gain * w + other
     if p.periodic != 0.0:
         inflow += p.periodic * sin(2 * pi * p.frequency * t + p.phase)
@@ -221,7 +221,7 @@ def flows(p, w, other, t, lower, upper):
 
 @njit(types.float64[:, ::1](floats(Tanks), *RECORD), cache=True)
 def fill(p, drive, u, other, lower, upper, dt, substeps):
-    """(lower, upper) [T substeps, 2] under the input u [T] and an inflow `other` [T + 1]."""
+    """Integrate (lower, upper) [T substeps, 2] under the input u [T] and an inflow `other` [T + 1]."""
     h = dt / substeps
     w = arriving(drive, u, dt, substeps)
     levels = np.empty((len(u) * substeps, 2))

@@ -1,0 +1,113 @@
+"""The strict CSV reader: it takes one row after the other, and names the row and the column of the first fault."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from reprlib import repr as short
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.data.formats.tables import BadCell, Table
+from simgap.records import UnusableInput
+
+# What a decimal number is made of. float() alone would also take 1_000, nan, inf and foreign digits.
+NUMBER_CHARACTERS = frozenset("0123456789+-.eE ")
+
+
+def strict_table(path: Path, content: bytes) -> Table:
+    """Read the CSV file row by row, its cells as text.
+
+    Raises UnusableInput for anything but UTF-8 text with commas, one header line and one line per sample.
+    """
+    rows = _rows(path, _text(path, content))
+    names = tuple(name.strip() for name in next(rows, []))
+    if not names:
+        raise UnusableInput(f"{path}: row 1 is empty; it must name the columns")
+    if len(names) == 1 and any(mark in names[0] for mark in ";\t|"):
+        mark = next(mark for mark in ";\t|" if mark in names[0])
+        raise UnusableInput(f"{path}: row 1 is separated by {mark!r}; save the file with commas instead")
+    columns: list[list[str]] = [[] for _ in names]
+    blank = 0
+    for number, row in enumerate(rows, start=2):
+        if not row:  # the line break at the end of a file is no sample
+            blank = blank or number
+        elif blank:
+            raise UnusableInput(f"{path}: row {blank} is empty; delete it or fill in the sample")
+        elif len(row) != len(names):
+            raise _uneven(path, number, row, names)
+        else:
+            for cells, cell in zip(columns, row, strict=True):
+                cells.append(cell)
+    if not columns[0]:
+        raise UnusableInput(f"{path}: nothing follows row 1, the names of the columns; add the samples")
+    return Table(str(path), names, tuple(columns), first_row=2, parse=parse_text)
+
+
+def parse_text(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
+    """Turn cells of text into float64. Raises BadCell at the first that is not a plain decimal number."""
+    if NUMBER_CHARACTERS.issuperset("".join(cells)):
+        try:
+            return np.array(list(map(float, cells)), dtype=np.float64)
+        except ValueError:
+            pass  # the search below finds the cell
+    for index, cell in enumerate(cells):
+        _check_cell(index, cell)
+    raise AssertionError("one of the cells is bad, or the fast way above had succeeded")
+
+
+def _check_cell(index: int, cell: str) -> None:
+    if not cell.strip():
+        raise BadCell(index, "the cell is empty; fill it in or cut the record before it")
+    if cell.strip().lower().lstrip("+-") in ("nan", "inf", "infinity", "na", "n/a", "null", "none"):
+        raise BadCell(index, f"{short(cell)} is no measurement; correct it or cut the record before it")
+    try:
+        float(cell)
+        plain = NUMBER_CHARACTERS.issuperset(cell)
+    except ValueError:
+        plain = False
+    if not plain:
+        raise BadCell(index, f"{short(cell)} is not a number; write it like -1.25 or 3e-4")
+
+
+def _text(path: Path, content: bytes) -> str:
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = content.count(b"\n", 0, error.start) + 1
+        raise UnusableInput(
+            f"{path}: row {row} is not UTF-8 text; save the file as CSV in the encoding UTF-8"
+        ) from None
+    if "\0" in text:
+        row = text.count("\n", 0, text.index("\0")) + 1
+        raise UnusableInput(f"{path}: row {row} holds a NUL byte, so this is no text; save the file as CSV")
+    if not text.strip():
+        raise UnusableInput(f"{path} is empty; give it a line of column names and a line per sample")
+    return text
+
+
+def _rows(path: Path, text: str) -> Iterator[list[str]]:
+    """Yield the rows as cells, each checked to be one line, so that row i is line i of the file."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    number = 0
+    try:
+        for number, row in enumerate(reader, start=1):
+            if reader.line_num != number:
+                raise UnusableInput(
+                    f"{path}: row {number}: a cell in quotes runs over several lines; keep each sample on one line"
+                )
+            yield row
+    except csv.Error as error:
+        why = f"row {number + 1} is no CSV: {error}; keep each sample on one line, cells apart by commas"
+        raise UnusableInput(f"{path}: {why}") from None
+
+
+def _uneven(path: Path, number: int, row: list[str], names: tuple[str, ...]) -> UnusableInput:
+    if len(row) < len(names):
+        why = f"ends before column {short(names[len(row)])}; complete or delete the row"
+    else:
+        why = f"has {len(row) - len(names)} more cells after column {short(names[-1])}; remove them"
+    return UnusableInput(f"{path}: row {number} {why}")

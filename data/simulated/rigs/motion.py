@@ -1,0 +1,40 @@
+"""The true motion of a rig with hidden effects, integrated at a fine step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+
+import numpy as np
+from jaxtyping import Float
+from numpy.random import Generator
+
+from simgap.data.simulated.rigs.kernels import Body, Drive, Tanks, fill, move
+from simgap.data.simulated.rigs.plants import Rig
+
+
+def simulate_motion(
+    rig: Rig, size: Mapping[str, float], u: np.ndarray, start_rng: Generator, missing_rng: Generator, substeps: int
+) -> Float[np.ndarray, "n ny"]:
+    """Integrate the true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
+    other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
+    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf)}
+    drive = Drive(**{field: known.get(field, size.get(field, 0.0)) for field in Drive._fields})
+    offset, middle = rig.start * np.clip(start_rng.standard_normal(2), -2, 2), rig.middle
+    first, second = (float(value) for value in offset + middle)
+    if rig.outflow:
+        known = {"gain": rig.gain, "outflow": rig.outflow, "upper": rig.upper, "rim": size.get("rim", inf)}
+        known |= {"level": middle[0], "upper_level": middle[1], "spill": 0.5, "frequency": rig.frequency, "phase": 0.7}
+        tanks = Tanks(**{field: known.get(field, size.get(field, 0.0)) for field in Tanks._fields})
+        return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
+    known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
+    known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7}
+    body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
+    motion = move(body, drive, u, other, first, second, rig.dt, substeps)
+    return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]
+
+
+def _band(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:
+    """Draw band-limited noise of standard deviation about 1: twenty sines with periods of 10 to 100 samples."""
+    frequencies, phases = rng.uniform(1 / 100, 1 / 10, 20), rng.random(20)
+    return np.sin(2 * np.pi * (np.arange(samples)[:, None] * frequencies + phases)).sum(axis=1) / np.sqrt(10)
