@@ -68,7 +68,7 @@ def drift(e: Errors) -> Iterator[Wrong]:
     most = int(np.argmax(np.abs(shift)))
     text = (
         f"The measured {name} drifts against its simulation by {_signed(shift[most], unit)} from the first to the "
-        f"second half of {e.names[most]} ({_signed(slope[most], rate(unit))}"
+        f"second half of experiment {e.names[most]} ({_signed(slope[most], rate(unit))}"
         f"{', the most of all experiments' if count > 1 else ''}): {_squared(share)}."
     )
     at = tuple(float(i + side) for i in range(1, count + 1) for side in (-0.25, 0.25))
@@ -77,7 +77,7 @@ def drift(e: Errors) -> Iterator[Wrong]:
 
 def experiments(e: Errors) -> Iterator[Wrong]:
     """View the mean and the RMS error over experiments, and over kinds of experiments (the ends of their names)."""
-    names, count = e.names, len(e.names)
+    names, count = tuple(f"experiment {name}" for name in e.names), len(e.names)
     if count < 2:
         return
     fitted = means(e.error, e.experiment) - e.error.mean()
@@ -86,7 +86,7 @@ def experiments(e: Errors) -> Iterator[Wrong]:
     sizes, owner = blocks(e.error, e.experiment)
     if np.bincount(owner, minlength=count).min() > 1:
         yield _by_size(e, "size by experiment", names, each, *chance.by_size(sizes, owner, e.seed))
-    suffixes = [name.rsplit("_", 1)[-1] if "_" in name else "" for name in names]
+    suffixes = [name.rsplit("_", 1)[-1] if "_" in name else "" for name in e.names]
     kinds, kind = np.unique(suffixes, return_inverse=True)
     if all(map(str.isalpha, kinds)) and np.count_nonzero(np.bincount(kind) > 1) > 1:
         labels = tuple(f"experiments of kind {name}" for name in kinds)
@@ -146,7 +146,7 @@ def _by_size(
     most, least = error(rms[high], e.channel.unit), error(rms[low], e.channel.unit)
     text = (
         f"The RMS error of {e.channel.name} is {most} in {labels[high]} and {least} in {labels[low]}: "
-        f"those above the average hold {percent(share)} more of the squared error than their share of the samples."
+        f"those above the average hold {percent(share)} more of the squared error than of the samples."
     )
     return Wrong(view, e.channel.name, share, p, text, _counted(rms), _floats(rms), "")
 

@@ -84,7 +84,7 @@ def _motion(e: Errors, output: int) -> Iterator[_Variable]:
     y_hat, kind, unit, name = e.y_hat[:, output], e.channel.kind, e.channel.unit, e.channel.name
     slope = by_experiment(lambda part: derivative(part, e.dt), y_hat, e.lengths)
     amplitudes = by_experiment(amplitude, y_hat, e.lengths)
-    yield _Variable("amplitude", unit, bin_values(amplitudes, f"local RMS of simulated {name}", unit))
+    yield _Variable("amplitude", unit, bin_values(amplitudes, f"amplitude (local RMS) of simulated {name}", unit))
     if kind in ("level", "other"):
         yield _Variable("level" if kind == "level" else "value", unit, bin_values(y_hat, f"simulated {name}", unit))
         yield _Variable("rate of change", rate(unit), bin_values(slope, "rate of change", rate(unit)))

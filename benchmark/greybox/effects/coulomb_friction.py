@@ -21,8 +21,8 @@ class CoulombFriction(ForceEffect):
         "until the drive exceeds it."
     )
     reference: ClassVar[str] = (
-        "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models ... for the control of machines with "
-        "friction, Automatica 30, 1994"
+        "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and compensation methods for "
+        "the control of machines with friction, Automatica 30, 1994"
     )
     role: ClassVar[Role] = "friction"
     shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
