@@ -105,7 +105,7 @@ class Effect(ABC):
     confounders: ClassVar[dict[str, str]] = {}
     # Simpler effects that this one contains as a special case; it takes their place in a model.
     contains: ClassVar[tuple[str, ...]] = ()
-    # The states that the term carries through a simulation.
+    # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
     memory: ClassVar[int] = 0
     # Substeps per sample that the term needs.
     substeps: ClassVar[int] = 1

@@ -32,6 +32,7 @@ CATALOGUE = {
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
     "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None),
     "stribeck_friction": Hidden("stribeck", "L/s^2 at high speed", 0.4, 40.0, 8.0, None, None),
+    "load_friction": Hidden("load_share", "share of the load", 0.3, 0.3, 0.3, None, None),
     "quadratic_drag": Hidden("drag", "1/L", 1.5, 0.3, 0.2, None, None),
     "quadratic_stiffness": Hidden("stiffness2", "1/(L s^2)", None, 0.45, 0.02, None, None),
     "cubic_stiffness": Hidden("stiffness3", "1/(L^2 s^2)", None, 0.3, 0.01, None, None),
