@@ -45,6 +45,7 @@ class Body(NamedTuple):
     drag: float  # 1/L
     stiffness2: float  # 1/(L s^2)
     stiffness3: float  # 1/(L^2 s^2)
+    gravity: float  # L/s^2, of a pendulum whose angle is in rad
     position_force: float  # L/s^2
     position_period: float  # L
     position_phase: float  # rad
@@ -127,6 +128,8 @@ def force(p, w, other, t, x, v, z):
     gain = p.gain
     if p.ripple != 0.0:  # sines are what costs time here
         gain *= 1.0 + p.ripple * sin(2 * pi * x / p.ripple_period)
+    if p.gravity != 0.0:
+        total -= p.gravity * sin(x)
     if p.position_force != 0.0:
         total -= p.position_force * sin(2 * pi * x / p.position_period + p.position_phase)
     if p.periodic != 0.0:
