@@ -119,8 +119,6 @@ def run_plant(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registe
                 for q in range(n_terms):
                     if roles[q] == FORCE:
                         force[entry] += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
-                    elif roles[q] == FRICTION:
-                        hold += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
                     elif roles[q] == OUTFLOW:
                         last = rates[s, n - 1]
                         for i in range(n):
@@ -130,6 +128,13 @@ def run_plant(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registe
                             force[i] -= flow
                             if i + 1 < n:
                                 force[i + 1] += flow
+                for q in range(n_terms):
+                    if roles[q] == FRICTION:
+                        if m_at[q] < m_at[q + 1]:
+                            # What the transmission carries: the drive against spring and forces.
+                            spring = rates[s, 0] * z[0] if n > 1 else 0.0
+                            memory[m_at[q]] = abs(drive[s, experiment, step] + spring - force[entry])
+                        hold += terms[q](z[0], z[fast], t, h, p, p_at[q], memory, m_at[q])
                 for i in range(n):
                     total = g0[i, entry] * drive[s, experiment, step]
                     for j in range(n):

@@ -164,6 +164,8 @@ class Plant:
         # A tank that is much faster than the sampling is no tank.
         fastest = 5 / self.dt if self.cascade else inf
         linear = [Parameter(f"a{i}", "", 0.0, fastest) for i in range(self.order)]
+        if self.order == 2 and any(term.effect.replaces_spring for term in self.terms):
+            linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
         linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]
         linear += [Parameter("d", "", -inf, inf)] * self.offset
         linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]

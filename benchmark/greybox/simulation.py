@@ -59,7 +59,7 @@ class Simulator:
         self._roles = np.array([ROLES[effect.role] for effect in acting] + [0] * unused)
         self._p_at = np.array([plant.part_of(term).start for term in forces] + [0] * unused)
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
-        self._m_at = np.array([*memory[:-1], *([0] * unused)])
+        self._m_at = np.array([*memory, *([memory[-1]] * unused)])  # one more: where the last one's memory ends
         self._memory = np.zeros(max(1, int(memory[-1])))
 
     def states(
@@ -77,7 +77,7 @@ class Simulator:
                 continue
             a = plant.matrix(theta)
             transition(a, self.h, e[i], g0[i], g1[i])
-            rates[i] = -np.diag(a)
+            rates[i] = -np.diag(a) if plant.cascade else -a[-1]
         states = np.empty((s, experiments, samples, n))
         entry, fast = (0, 0) if plant.cascade else (n - 1, min(1, n - 1))
         run_plant_directly(

@@ -105,7 +105,7 @@ class Effect(ABC):
     confounders: ClassVar[dict[str, str]] = {}
     # Simpler effects that this one contains as a special case; it takes their place in a model.
     contains: ClassVar[tuple[str, ...]] = ()
-    # The states that the term carries through a simulation.
+    # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
     memory: ClassVar[int] = 0
     # Substeps per sample that the term needs.
     substeps: ClassVar[int] = 1
@@ -123,6 +123,8 @@ class Effect(ABC):
     instead_of_order: ClassVar[bool] = False
     # The linear plant fitted without it has other poles, so that a fit with it searches for the poles anew.
     moves_poles: ClassVar[bool] = False
+    # A force over position that stands in the place of the linear spring of a plant of second order.
+    replaces_spring: ClassVar[bool] = False
     # The readings alone show it, so that it is tried before anything else.
     visible_in_readings: ClassVar[bool] = False
     # A reading does not tell on which side of zero the quantity is.

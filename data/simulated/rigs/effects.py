@@ -19,22 +19,25 @@ class Hidden(NamedTuple):
     slide: float | None
     tank: float | None
     tanks: float | None
+    arm: float | None = None
 
 
 CATALOGUE = {
-    "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0),
+    "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0, 0.7),
     "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5),
     "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
-    "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0),
+    "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
-    "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None),
+    "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0),
     "stribeck_friction": Hidden("stribeck", "L/s^2 at high speed", 0.4, 40.0, 8.0, None, None),
+    "load_friction": Hidden("load_share", "share of the load", 0.3, 0.3, 0.3, None, None),
     "quadratic_drag": Hidden("drag", "1/L", 1.5, 0.3, 0.2, None, None),
     "quadratic_stiffness": Hidden("stiffness2", "1/(L s^2)", None, 0.45, 0.02, None, None),
     "cubic_stiffness": Hidden("stiffness3", "1/(L^2 s^2)", None, 0.3, 0.01, None, None),
+    "gravity": Hidden("gravity", "L/s^2", None, None, None, None, None, 20.0),
     "position_torque": Hidden("position_force", "L/s^2", None, 60.0, 12.0, None, None),
     "periodic_disturbance": Hidden("periodic", "L/s^2", 0.8, 50.0, 10.0, 0.06, 0.06),
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),

@@ -38,12 +38,14 @@ class Body(NamedTuple):
     stiffness: float  # 1/s^2
     load: float  # L/s^2
     coulomb: float  # L/s^2
+    load_share: float  # of the force that the transmission carries
     stribeck: float  # L/s^2 at high speed; at rest times `breakaway`
     breakaway: float
     stribeck_velocity: float  # L/s
     drag: float  # 1/L
     stiffness2: float  # 1/(L s^2)
     stiffness3: float  # 1/(L^2 s^2)
+    gravity: float  # L/s^2, of a pendulum whose angle is in rad
     position_force: float  # L/s^2
     position_period: float  # L
     position_phase: float  # rad
@@ -109,9 +111,9 @@ def arriving(drive, u, dt, substeps):
 
 
 @njit(cache=True)
-def friction(p, v):
+def friction(p, w, x, v):
     """Compute the size of the dry friction of a moving body; at v = 0 the force at which it breaks away."""
-    size = p.coulomb
+    size = p.coulomb + p.load_share * abs(p.gain * w + p.stiffness * x)
     if p.stribeck != 0.0:
         size += p.stribeck * (1.0 + (p.breakaway - 1.0) * exp(-((v / p.stribeck_velocity) ** 2)))
     return size
@@ -126,6 +128,8 @@ def force(p, w, other, t, x, v, z):
     gain = p.gain
     if p.ripple != 0.0:  # sines are what costs time here
         gain *= 1.0 + p.ripple * sin(2 * pi * x / p.ripple_period)
+    if p.gravity != 0.0:
+        total -= p.gravity * sin(x)
     if p.position_force != 0.0:
         total -= p.position_force * sin(2 * pi * x / p.position_period + p.position_phase)
     if p.periodic != 0.0:
@@ -137,7 +141,7 @@ def force(p, w, other, t, x, v, z):
 def rates(p, w, other, side, t, x, v, z):
     """Compute d/dt of (x, v, z); z in [-1, 1] is Bouc-Wen's state: z' = (v - |v| z / 2 - v |z| / 2) / width."""
     dz = (v - 0.5 * abs(v) * z - 0.5 * v * abs(z)) / p.hysteresis_width
-    return v, force(p, w, other, t, x, v, z) - side * friction(p, v), dz
+    return v, force(p, w, other, t, x, v, z) - side * friction(p, w, x, v), dz
 
 
 @njit(cache=True)
@@ -155,8 +159,7 @@ def glide(p, w, other, side, t, h, x, v, z):
 @njit(cache=True)
 def step_body(p, w, other, t, h, x, v, z):
     """Move (x, v, z) on by h seconds, with sticking."""
-    breakaway = friction(p, 0.0)
-    if breakaway == 0.0:
+    if p.coulomb == 0.0 and p.stribeck == 0.0 and p.load_share == 0.0:
         return glide(p, w, other, 0.0, t, h, x, v, z)
     rest = h
     if v != 0.0:
@@ -169,7 +172,7 @@ def step_body(p, w, other, t, h, x, v, z):
         x, _, z = glide(p, w, other, side, t, used, x, v, z)
         rest = h - used
     net = force(p, w[1], other[1], t + h - rest / 2, x, 0.0, z)
-    if abs(net) <= breakaway or rest == 0.0:
+    if abs(net) <= friction(p, w[1], x, 0.0) or rest == 0.0:
         return x, 0.0, z
     side = 1.0 if net > 0 else -1.0
     x_end, v_end, z_end = glide(p, w, other, side, t + h - rest, rest, x, 0.0, z)

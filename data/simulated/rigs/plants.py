@@ -1,4 +1,4 @@
-"""The five rigs before anything is hidden in them."""
+"""The rigs before anything is hidden in them."""
 
 from __future__ import annotations
 
@@ -88,6 +88,10 @@ RIGS = {
             "tanks", 4.0, VOLT, LEVEL,
             gain=0.07, amplitude=4.0, reach=16.0, outflow=0.028, upper=0.04, start=(2.0, 1.5), frequency=0.0037,
             outlier=10.0,
+        ),
+        Rig(
+            "arm", 0.02, Channel("torque", "N m"), (Channel("angle", "rad", "position"),),
+            gain=8.0, amplitude=3.0, reach=2.5, damping=3.0, start=(0.4, 1.0), frequency=0.7, outlier=3.0,
         ),
     )
 }  # fmt: skip

@@ -1,0 +1,59 @@
+"""Friction that grows with the load."""
+
+from __future__ import annotations
+
+from typing import ClassVar, final
+
+from simgap.findings import ViewName
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.registry import EFFECTS
+
+
+@EFFECTS.register("load_friction")
+@final
+class LoadFriction(ForceEffect):
+    """f = -(Fc + k |drive - load|) sign(v), the load being what spring, gravity and other forces put on the drive."""
+
+    name: ClassVar[str] = "load_friction"
+    title: ClassVar[str] = "friction that grows with the load"
+    explanation: ClassVar[str] = (
+        "Dry friction in proportion to the force that the transmission carries, on top of a constant part: teeth and "
+        "bearings of a gear are pressed together harder the more it works, so a loaded joint holds where it stands."
+    )
+    reference: ClassVar[str] = (
+        "Duclusaud, Passault, Padois, Ly, Extended friction models for the physics simulation of servo actuators, ICRA "
+        "2025 (arXiv 2410.08650), eq. of model M3"
+    )
+    role: ClassVar[Role] = "friction"
+    memory: ClassVar[int] = 1
+    contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
+    confounders: ClassVar[dict[str, str]] = {
+        "coulomb_friction": "repeat a slow stroke with twice the load: friction that grows with it doubles as well",
+        "stribeck_friction": "repeat a slow stroke with twice the load: Stribeck friction stays the same",
+        "dead_zone": (
+            "hold a load and lower the input slowly: friction that grows with the load keeps it where it stands until "
+            "the input has fallen by a share of itself"
+        ),
+        "hysteresis": "make very small strokes: a hysteretic force pulls back like a spring, dry friction just sticks",
+    }
+
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
+        """Return the constant friction force, and the share of the load that adds to it."""
+        return (
+            Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),
+            Parameter("share of the load", "", 0.0, 0.95),
+        )
+
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from shares of the load with and without a constant part."""
+        return [Start((level * scales.force_rms, share)) for level in (0.0, 0.1) for share in (0.1, 0.3, 0.6)]
+
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the output is that of a motion."""
+        return scales.kind in MOTION
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """Return the force that dry friction can hold; m[j] is the load."""
+        return p[i] + p[i + 1] * m[j]
