@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 Kind = Literal["position", "velocity", "level", "other"]
+KindFrom = Literal["written", "header", "option", "unknown"]
 Status = Literal["ok", "diverged", "error", "timeout"]
 
 # No measurement is larger; squares and sums of squares of such values still fit into float64.
@@ -29,11 +30,22 @@ class UnusableInput(ValueError):
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of `u` or `y`: its name, its physical unit and, for outputs, what kind of motion it is."""
+    """One column of `u` or `y`: its name, its physical unit and, for outputs, what kind of motion it is.
+
+    `kind_from` says who knows the kind: somebody wrote it (also in Python), a heading with its unit told it, an option
+    did, or nobody. A kind that is left out is "other" and unknown. Channels are equal whoever knows their kind.
+    """
 
     name: str
     unit: str = ""
-    kind: Kind = "other"
+    kind: Kind = None  # type: ignore[assignment]  # filled in below when nobody gave it
+    kind_from: KindFrom = field(default=None, compare=False)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.kind_from is None:
+            object.__setattr__(self, "kind_from", "unknown" if self.kind is None else "written")
+        if self.kind is None:
+            object.__setattr__(self, "kind", "other")
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,33 @@
-"""`load`: one way in for registered data sets, folders, CSV files and DataFrames."""
+"""`load`: one way in for registered data sets, folders, files and DataFrames; `read` also says what it inferred."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from simgap.data.formats.csv_files import read_csv
-from simgap.data.formats.description import check_columns
 from simgap.data.formats.folder import load_folder
-from simgap.data.formats.sampling import check_time, sampling_time
+from simgap.data.formats.one_record import Choices, dataset_of
 from simgap.data.formats.tables import Table
-from simgap.data.splits import assemble, split_in_time
-from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
+from simgap.data.kinds import told, with_kinds
+from simgap.records import Dataset, UnusableInput
 from simgap.registry import DATASETS
 
-TIME_COLUMNS = ("t", "time")
+Kinds = str | Mapping[str, str] | None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A data set, and in words what was inferred, cut or interpolated on the way to it."""
+
+    dataset: Dataset
+    said: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Tell in one line what was inferred; empty where nothing was."""
+        return f"read: {', '.join(self.said)}" if self.said else ""
 
 
 def load(
@@ -25,65 +36,86 @@ def load(
     outputs: Sequence[str] = (),
     dt: float | None = None,
     name: str | None = None,
+    kind: Kinds = None,
+    resample: float | None = None,
+    split_gaps: bool = False,
 ) -> Dataset:
-    """Load a data set: a registered name, a folder with dataset.toml, a CSV file or a pandas DataFrame.
+    """Load a data set: a registered name, a folder with dataset.toml, a file of one record or a pandas DataFrame.
 
-    A CSV file and a DataFrame are one record: `inputs` and `outputs` name its columns, the sampling time is
-    that of the column "t" or "time" or `dt` in seconds, and the record is split in time 60/20/20.
+    A file (CSV, .mat or .parquet) and a DataFrame are one record: `inputs` and `outputs` name its columns, with or
+    without the unit that stands there. The sampling time is that of the time column or `dt` in seconds, and the record
+    is split in time 60/20/20. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
+    `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap.
     Raises UnusableInput when the data cannot be used, and its subclass Missing when they are not at hand.
     """
-    declared = bool(inputs or outputs or dt is not None or name is not None)
-    if isinstance(source, str) and source in DATASETS:
-        _refuse_columns(declared, f"data set {source}")
-        return DATASETS[source]()
+    return read(source, inputs, outputs, dt, name, kind, resample, split_gaps).dataset
+
+
+def read(
+    source: Any,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    name: str | None = None,
+    kind: Kinds = None,
+    resample: float | None = None,
+    split_gaps: bool = False,
+) -> Reading:
+    """Load a data set as `load` does, and say in words what was inferred, cut or interpolated."""
+    choices = Choices(inputs, outputs, dt, name, resample, split_gaps)
+    known = _known(source, choices)
+    if known is not None:
+        return Reading(with_kinds(known, kind))
     if not isinstance(source, str | os.PathLike):
         from simgap.data.formats.frames import table_of  # pandas is slow to import
 
-        return _dataset_of(table_of(source), inputs, outputs, dt, name or "DataFrame")
-    path = Path(source)
+        table, name = table_of(source), name or "DataFrame"
+    else:
+        table, name = _table(Path(source), choices), name or Path(source).stem
+    dataset, said = dataset_of(table, choices, name)
+    dataset = with_kinds(dataset, kind)
+    return Reading(dataset, (*told(dataset.channels), *said))
+
+
+def _known(source: Any, choices: Choices) -> Dataset | None:
+    """Load a source that describes itself; None for a file and a DataFrame."""
+    if isinstance(source, str) and source in DATASETS:
+        _refuse_columns(choices, f"data set {source}")
+        return DATASETS[source]()
+    if not isinstance(source, str | os.PathLike):
+        return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
-        _refuse_columns(declared, f"folder {path}")
-        return load_folder(path)
+        _refuse_columns(choices, f"folder {Path(source)}")
+        return load_folder(Path(source))
     if not os.path.exists(source):  # noqa: PTH110
         raise UnusableInput(
             f"there is no data set, folder or CSV file called {os.fspath(source)!r}; "
             f"known data sets are {', '.join(DATASETS.names())}"
         )
-    return _dataset_of(read_csv(path), inputs, outputs, dt, name or path.stem)
+    return None
 
 
-def _refuse_columns(declared: bool, source: str) -> None:
-    if declared:
+def _table(path: Path, choices: Choices) -> Table:
+    """Read a file by its ending; any other ending is CSV."""
+    if not path.is_file():  # a pipe would never end
+        raise UnusableInput(f"{path} is missing or no ordinary file; give a CSV file")
+    match path.suffix.lower():
+        case ".mat":
+            from simgap.data.formats.mat_files import read_mat
+
+            return read_mat(path, (*choices.inputs, *choices.outputs))
+        case ".parquet":
+            from simgap.data.formats.parquet_files import read_parquet
+
+            return read_parquet(path)
+        case _:
+            from simgap.data.formats.csv_files import read_csv
+
+            return read_csv(path)
+
+
+def _refuse_columns(choices: Choices, source: str) -> None:
+    if any((choices.inputs, choices.outputs, choices.resample, choices.split_gaps)) or (
+        choices.dt is not None or choices.name is not None
+    ):
         raise UnusableInput(f"{source} knows its columns, sampling time and name; leave those arguments out")
-
-
-def _dataset_of(table: Table, inputs: Sequence[str], outputs: Sequence[str], dt: float | None, name: str) -> Dataset:
-    for column_list, role in ((inputs, "inputs"), (outputs, "outputs")):
-        if isinstance(column_list, str) or not column_list:
-            raise UnusableInput(
-                f"{table.source}: say which columns are the {role} (--{role[:-1]} NAME, or {role}=[..] in Python); "
-                f"there are {', '.join(map(repr, table.names[:20]))}"
-            )
-    if dt is not None and not 0 < dt <= LARGEST_VALUE:
-        raise UnusableInput(f"{table.source}: dt = {dt} must be a positive number of seconds, such as 0.1")
-    check_columns((*inputs, *outputs), table.source)
-    for column in (*inputs, *outputs):
-        table.cells_of(column)  # a misspelt column is a better answer than a missing sampling time
-    channels = Channels(tuple(map(Channel, inputs)), tuple(map(Channel, outputs)))
-    record = table.experiment("record", channels, _sampling_time(table, {*inputs, *outputs}, dt))
-    return assemble(name, split_in_time(record), channels, None, table.source)
-
-
-def _sampling_time(table: Table, used: set[str], dt: float | None) -> float:
-    times = [column for column in TIME_COLUMNS if column in table.names and column not in used]
-    if len(times) > 1:
-        raise UnusableInput(f"{table.source}: columns 't' and 'time' both look like the time; rename one")
-    if dt is None and not times:
-        raise UnusableInput(
-            f"{table.source}: the sampling time is not known; give dt in seconds or a column 't' or 'time'"
-        )
-    if dt is None:
-        return sampling_time(table, times[0])
-    for column in times:
-        check_time(table, column, dt)
-    return float(dt)

@@ -12,6 +12,7 @@ from simgap.records import Channels, Dataset, Experiment, TrainingSet, UnusableI
 Experiments = tuple[Experiment, ...]
 
 LARGEST_DEFAULT_N_INIT = 20
+NEAR_THE_END = 20  # a split moves by this part of all samples, so that it cuts no record into a stump
 
 
 def split_in_time(record: Experiment) -> tuple[Experiments, Experiments, Experiments]:
@@ -19,6 +20,31 @@ def split_in_time(record: Experiment) -> tuple[Experiments, Experiments, Experim
     a, b = len(record) * 3 // 5, len(record) * 4 // 5
     train, valid, test = record[:a], record[a:b], record[b:]
     return (replace(train, name="train"),), (replace(valid, name="valid"),), (replace(test, name="test"),)
+
+
+def split_pieces(records: Sequence[Experiment]) -> tuple[Experiments, Experiments, Experiments]:
+    """Part several records, in order of time, where 60 and 80 % of all samples lie.
+
+    A split next to the end of a record falls there; else it cuts the record.
+    """
+    stops = np.cumsum([len(record) for record in records])
+    total = int(stops[-1])
+    cuts = [0]
+    for share in (3, 4):
+        cut = total * share // 5
+        nearest = int(stops[np.argmin(np.abs(stops - cut))])
+        cuts.append(nearest if abs(nearest - cut) <= total // NEAR_THE_END else cut)
+    splits: list[Experiments] = []
+    for low, high in zip(cuts, [*cuts[1:], total], strict=True):
+        inside = []
+        for stop, record in zip(stops, records, strict=True):
+            start = int(stop) - len(record)
+            a, b = max(low - start, 0), min(high - start, len(record))
+            if a < b:
+                inside.append(record[a:b])
+        splits.append(tuple(inside))
+    train, valid, test = splits
+    return train, valid, test
 
 
 def hold_out_tails(records: Sequence[Experiment]) -> tuple[Experiments, Experiments]:

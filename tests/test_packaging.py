@@ -56,7 +56,8 @@ def test_every_imported_package_is_declared_and_every_declared_one_imported():
     imported -= set(sys.stdlib_module_names) | {"simgap"}
     distributions = packages_distributions()
     names = {canonicalize_name(name) for module in imported for name in distributions.get(module, [module])}
-    declared = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["ray"]
+    extras = PROJECT["project"]["optional-dependencies"]
+    declared = PROJECT["project"]["dependencies"] + extras["ray"] + extras["files"]
     assert names == {canonicalize_name(Requirement(line).name) for line in declared}
 
 

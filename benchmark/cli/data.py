@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, write_json
+from simgap.cli.options import Inputs, Json, KindOf, Outputs, Resample, SamplingTime, SplitGaps, read_data, write_json
 
 app = typer.Typer(help="Make, fetch and check data sets.", rich_markup_mode=None)
 
@@ -41,12 +41,15 @@ def check(
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
+    kind: KindOf = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     json: Json = None,
 ) -> None:
     """Read a data set as `run` would, refuse it with a reason, or say what it holds."""
-    from simgap.data import describe, load
+    from simgap.data import describe
 
-    described = describe(load(name, inputs=inputs or (), outputs=outputs or (), dt=dt))
+    described = describe(read_data(name, inputs, outputs, dt, kind, resample, split_gaps))
     if json is not None:
         write_json(json, described)
     typer.echo(f"{described['name']}: usable, sampled every {described['sampling_time']:g} s")

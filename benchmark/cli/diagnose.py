@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, check_writable, write_json
+from simgap.cli.options import (
+    Inputs,
+    Json,
+    KindOf,
+    Outputs,
+    Resample,
+    SamplingTime,
+    SplitGaps,
+    check_writable,
+    read_data,
+    write_json,
+)
 
 
 def diagnose(
@@ -15,6 +26,9 @@ def diagnose(
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
+    kind: KindOf = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
@@ -23,7 +37,8 @@ def diagnose(
     from simgap.diagnosis.diagnose import diagnose
 
     check_writable(json, html)
-    answer = diagnose(data, inputs or (), outputs or (), dt, seed, profiles=html is not None)
+    dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
+    answer = diagnose(dataset, seed=seed, profiles=html is not None)
     if json is not None:
         write_json(json, answer.to_json())
     if html is not None:

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, parse_params, write_json
+from simgap.cli.options import (
+    Inputs,
+    Json,
+    KindOf,
+    Outputs,
+    Resample,
+    SamplingTime,
+    SplitGaps,
+    parse_params,
+    read_data,
+    write_json,
+)
 
 if TYPE_CHECKING:
     import rich.console
@@ -28,6 +39,9 @@ def fit(
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
+    kind: KindOf = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
     save: Annotated[Path | None, typer.Option(help="Folder for the weights of a network.")] = None,
@@ -45,8 +59,10 @@ def fit(
         raise UnusableInput(f"--save: {model} is no network, and only networks have weights to save")
     console = Console()
     try:
+        fitting.check_params(model, params)  # first, because data may take seconds to load
+        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
         with _progress(console):
-            done = fitting.fit(model, data, params, seed, inputs or (), outputs or (), dt)
+            done = fitting.fit(model, dataset, params, seed)
     except (UnusableInput, KeyboardInterrupt, OSError):
         raise
     except Exception as error:  # the model's own fault, without our traceback

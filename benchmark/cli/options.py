@@ -6,15 +6,26 @@ import json
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from simgap.records import UnusableInput
 
+if TYPE_CHECKING:
+    from simgap.records import Dataset
+
 Inputs = Annotated[list[str] | None, typer.Option("--input", help="Input column of a CSV file; repeatable.")]
 Outputs = Annotated[list[str] | None, typer.Option("--output", help="Output column; repeatable.")]
 SamplingTime = Annotated[float | None, typer.Option("--dt", help="Sampling time of a CSV file in seconds.")]
+KindOf = Annotated[
+    list[str] | None,
+    typer.Option("--kind", help="What an output is: NAME=position, velocity, level or other; repeatable."),
+]
+Resample = Annotated[
+    float | None, typer.Option("--resample", metavar="DT", help="Interpolate onto an even grid of DT seconds.")
+]
+SplitGaps = Annotated[bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the same for machines into this file.")]
 
 
@@ -35,6 +46,37 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             params[name] = text  # a word without quotes
     return params
+
+
+def parse_kinds(pairs: Sequence[str]) -> str | dict[str, str] | None:
+    """["v=velocity"] as {"v": "velocity"}; a single ["velocity"] as it is. Raises UnusableInput."""
+    if len(pairs) == 1 and "=" not in pairs[0]:
+        return pairs[0].strip()
+    kinds = {}
+    for pair in pairs:
+        name, equals, kind = pair.rpartition("=")
+        if not (equals and name.strip()):
+            raise UnusableInput(f"--kind {pair}: write it as NAME=KIND where there are several outputs")
+        kinds[name.strip()] = kind.strip()
+    return kinds or None
+
+
+def read_data(
+    data: str,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    dt: float | None = None,
+    kind: Sequence[str] | None = None,
+    resample: float | None = None,
+    split_gaps: bool = False,
+) -> Dataset:
+    """Load the data of a command and print in one line what was inferred, if anything was. Raises UnusableInput."""
+    from simgap.data import read
+
+    reading = read(data, inputs or (), outputs or (), dt, None, parse_kinds(kind or ()), resample, split_gaps)
+    if str(reading):
+        typer.echo(str(reading))
+    return reading.dataset
 
 
 def check_writable(*files: Path | None) -> None:

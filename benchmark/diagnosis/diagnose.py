@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,18 +35,21 @@ def diagnose(
     seed: int = 0,
     profiles: bool = False,
     views_too: bool = True,
+    kind: str | Mapping[str, str] | None = None,
 ) -> Diagnosis:
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
     `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the intervals and
     of the views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it;
-    without `views_too` the views of the error are left out.
+    without `views_too` the views of the error are left out. `kind` says what the outputs are, as in `simgap.load`.
     Raises UnusableInput.
     """
     from simgap.data import load
+    from simgap.data.kinds import with_kinds
 
     begin = time.perf_counter()
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
+    dataset = with_kinds(dataset, kind)
     identified = identify(dataset.training)
     model = GreyBoxModel([one.plant for one in identified])
     plain = GreyBoxModel([one.plain for one in identified])

@@ -14,7 +14,8 @@ from simgap.records import LARGEST_VALUE, Channel, Channels, Kind, UnusableInput
 FILE = "dataset.toml"
 KINDS = get_args(Kind)
 KEYS = ("name", "sampling_time", "time", "n_init", "inputs", "outputs", "splits")
-CHANNEL_KEYS = ("name", "unit", "kind")
+CHANNEL_KEYS = ("name", "unit", "kind", "kind_from")
+NOT_WRITTEN = ("header", "option")  # where a saved kind came from, if nobody had written it
 SPLITS = ("train", "valid", "test")
 
 
@@ -91,11 +92,14 @@ def _channels(entries: Any, key: str, file: Path) -> tuple[Channel, ...]:
     channels = []
     for entry in entries:
         _check_keys(entry, CHANNEL_KEYS, f"{file}: [[{key}]]", required=("name",))
-        kind = entry.get("kind", "other")
-        if kind not in KINDS:
+        kind, kind_from = entry.get("kind"), entry.get("kind_from", "written" if "kind" in entry else "unknown")
+        if "kind" in entry and kind not in KINDS:
             raise UnusableInput(f"{file}: {key} has the kind {short(kind)}; use one of {', '.join(KINDS)}")
+        if "kind_from" in entry and (kind_from not in NOT_WRITTEN or "kind" not in entry):
+            known = " or ".join(NOT_WRITTEN)
+            raise UnusableInput(f"{file}: {key} has the kind_from {short(kind_from)}; {known} can stand beside a kind")
         unit = _text(entry.get("unit", ""), f"unit of {key}", file, may_be_empty=True)
-        channels.append(Channel(_text(entry["name"], f"name of {key}", file), unit, kind))
+        channels.append(Channel(_text(entry["name"], f"name of {key}", file), unit, kind or "other", kind_from))
     return tuple(channels)
 
 

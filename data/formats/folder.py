@@ -38,7 +38,9 @@ def _experiment(file: Path, name: str, described: Description) -> Experiment:
     table = read_csv(file)
     if described.time is not None:
         check_time(table, described.time, described.sampling_time)
-    return table.experiment(name, described.channels, described.sampling_time)
+    inputs = [channel.name for channel in described.channels.inputs]
+    outputs = [channel.name for channel in described.channels.outputs]
+    return table.experiment(name, inputs, outputs, described.sampling_time)
 
 
 def _matching(folder: Path, split: str, pattern: str) -> list[Path]:

@@ -13,17 +13,22 @@ from simgap.data.formats.tables import BadCell, Table
 from simgap.records import UnusableInput
 
 
-def table_of(frame: Any) -> Table:
-    """Make a table of a DataFrame's columns. Raises UnusableInput for anything but a DataFrame with rows."""
+def table_of(frame: Any, source: str = "DataFrame") -> Table:
+    """Make a table of a DataFrame's columns, and of its index if that has a name.
+
+    Raises UnusableInput for anything but a DataFrame with rows.
+    """
     if not isinstance(frame, pd.DataFrame):
         raise UnusableInput(
             f"a data set cannot be made from {type(frame).__name__}; "
             f"give a registered name, a folder, a CSV file or a DataFrame"
         )
     if frame.empty:
-        raise UnusableInput("DataFrame: it has no rows or no columns; give it one row per sample")
+        raise UnusableInput(f"{source}: it has no rows or no columns; give it one row per sample")
+    if frame.index.nlevels == 1 and frame.index.name is not None and frame.index.name not in frame.columns:
+        frame = frame.reset_index()
     columns = tuple(frame.iloc[:, i] for i in range(frame.shape[1]))
-    return Table("DataFrame", tuple(map(str, frame.columns)), columns, first_row=0, parse=_parse)
+    return Table(source, tuple(map(str, frame.columns)), columns, first_row=0, parse=_parse)
 
 
 def _parse(column: pd.Series) -> Float[np.ndarray, " T"]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from reprlib import repr as short
 
 import numpy as np
 from jaxtyping import Float
 
+from simgap.data.formats.layout import LINE, Layout, layout_of
 from simgap.data.formats.tables import BadCell, Table
 from simgap.records import UnusableInput
 
@@ -21,18 +23,20 @@ NUMBER_CHARACTERS = frozenset("0123456789+-.eE ")
 def strict_table(path: Path, content: bytes) -> Table:
     """Read the CSV file row by row, its cells as text.
 
-    Raises UnusableInput for anything but UTF-8 text with commas, one header line and one line per sample.
+    Raises UnusableInput for anything but UTF-8 text with one header line and one line per sample.
     """
-    rows = _rows(path, _text(path, content))
+    text = _text(path, content)
+    layout = layout_of(text)
+    rows = _rows(path, text, layout)
     names = tuple(name.strip() for name in next(rows, []))
+    header, first = layout.skipped + 1, layout.first_row
     if not names:
-        raise UnusableInput(f"{path}: row 1 is empty; it must name the columns")
-    if len(names) == 1 and any(mark in names[0] for mark in ";\t|"):
-        mark = next(mark for mark in ";\t|" if mark in names[0])
-        raise UnusableInput(f"{path}: row 1 is separated by {mark!r}; save the file with commas instead")
+        raise UnusableInput(f"{path}: row {header} is empty; it must name the columns")
+    if len(names) == 1 and "|" in names[0]:
+        raise UnusableInput(f"{path}: row {header} is separated by '|'; save the file with commas instead")
     columns: list[list[str]] = [[] for _ in names]
     blank = 0
-    for number, row in enumerate(rows, start=2):
+    for number, row in enumerate(islice(rows, bool(layout.units), None), start=first):
         if not row:  # the line break at the end of a file is no sample
             blank = blank or number
         elif blank:
@@ -43,8 +47,9 @@ def strict_table(path: Path, content: bytes) -> Table:
             for cells, cell in zip(columns, row, strict=True):
                 cells.append(cell)
     if not columns[0]:
-        raise UnusableInput(f"{path}: nothing follows row 1, the names of the columns; add the samples")
-    return Table(str(path), names, tuple(columns), first_row=2, parse=parse_text)
+        raise UnusableInput(f"{path}: nothing follows row {first - 1}, the names of the columns; add the samples")
+    parse = parse_text if layout.decimal == "." else parse_decimal_commas
+    return Table(str(path), names, tuple(columns), first, parse, layout.skipped + 1, layout)
 
 
 def parse_text(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
@@ -59,7 +64,19 @@ def parse_text(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
     raise AssertionError("one of the cells is bad, or the fast way above had succeeded")
 
 
-def _check_cell(index: int, cell: str) -> None:
+def parse_decimal_commas(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
+    """Turn cells of text with decimal commas into float64. Raises BadCell at the first that is no such number."""
+    for index, cell in enumerate(cells):
+        if "." in cell:
+            raise BadCell(index, f"{short(cell)} has a point where this file has decimal commas; write it like -1,25")
+    try:
+        return parse_text([cell.replace(",", ".") for cell in cells])
+    except BadCell as bad:
+        _check_cell(bad.index, cells[bad.index], example="-1,25")
+        raise
+
+
+def _check_cell(index: int, cell: str, example: str = "-1.25") -> None:
     if not cell.strip():
         raise BadCell(index, "the cell is empty; fill it in or cut the record before it")
     if cell.strip().lower().lstrip("+-") in ("nan", "inf", "infinity", "na", "n/a", "null", "none"):
@@ -70,7 +87,7 @@ def _check_cell(index: int, cell: str) -> None:
     except ValueError:
         plain = False
     if not plain:
-        raise BadCell(index, f"{short(cell)} is not a number; write it like -1.25 or 3e-4")
+        raise BadCell(index, f"{short(cell)} is not a number; write it like {example} or 3e-4")
 
 
 def _text(path: Path, content: bytes) -> str:
@@ -89,19 +106,24 @@ def _text(path: Path, content: bytes) -> str:
     return text
 
 
-def _rows(path: Path, text: str) -> Iterator[list[str]]:
-    """Yield the rows as cells, each checked to be one line, so that row i is line i of the file."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    number = 0
+def _rows(path: Path, text: str, layout: Layout) -> Iterator[list[str]]:
+    """Yield the header and the rows as cells, each checked to be one line, so that row i is line i of the file."""
+    at = 0
+    for _ in range(layout.skipped):
+        at = LINE.match(text, at).end()  # type: ignore[union-attr]  # it matches anywhere
+    stream = io.StringIO(text[at:].lstrip("# ") if layout.header_is_comment else text[at:], newline="")
+    reader = csv.reader(stream, strict=True, delimiter=layout.separator)
+    number = layout.skipped
     try:
-        for number, row in enumerate(reader, start=1):
-            if reader.line_num != number:
+        for number, row in enumerate(reader, start=layout.skipped + 1):
+            if reader.line_num != number - layout.skipped:
                 raise UnusableInput(
                     f"{path}: row {number}: a cell in quotes runs over several lines; keep each sample on one line"
                 )
             yield row
     except csv.Error as error:
-        why = f"row {number + 1} is no CSV: {error}; keep each sample on one line, cells apart by commas"
+        apart = {",": "commas", ";": "semicolons", "\t": "tabs"}[layout.separator]
+        why = f"row {number + 1} is no CSV: {error}; keep each sample on one line, cells apart by {apart}"
         raise UnusableInput(f"{path}: {why}") from None
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simgap.data.formats.description import FILE, SPLITS, check_columns, columns_of
+from simgap.data.formats.description import FILE, NOT_WRITTEN, SPLITS, check_columns, columns_of
 from simgap.data.formats.folder import natural_order
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 
@@ -75,7 +75,11 @@ def _toml(dataset: Dataset, time: str | None) -> str:
     for key, channels in (("inputs", dataset.channels.inputs), ("outputs", dataset.channels.outputs)):
         for channel in channels:
             lines += ["", f"[[{key}]]", f"name = {_quoted(channel.name)}"]
-            lines += [f"unit = {_quoted(channel.unit)}", f"kind = {_quoted(channel.kind)}"]
+            lines.append(f"unit = {_quoted(channel.unit)}")
+            if channel.kind_from != "unknown" or channel.kind != "other":
+                lines.append(f"kind = {_quoted(channel.kind)}")
+            if channel.kind_from in NOT_WRITTEN:
+                lines.append(f"kind_from = {_quoted(channel.kind_from)}")
     lines += ["", "[splits]", *(f'{split} = "{split}/*.csv"' for split in SPLITS)]
     return "\n".join(lines) + "\n"
 

@@ -70,7 +70,7 @@ def daisy_hairdryer(folder: Path) -> Dataset:
     Licence: not stated.
     """
     table = _columns(folder, "hairdryer", 2)
-    y = Channel("temperature", "V")
+    y = Channel("temperature", "V", "other")
     return _dataset("daisy_hairdryer", table, 0.08, Channel("heater", "V"), y)
 
 
@@ -93,7 +93,7 @@ def daisy_robot_arm(folder: Path) -> Dataset:
     Licence: not stated.
     """
     table = _columns(folder, "robotArm", 2)
-    return _dataset("daisy_robot_arm", table, 1.0, Channel("torque"), Channel("acceleration"))
+    return _dataset("daisy_robot_arm", table, 1.0, Channel("torque"), Channel("acceleration", kind="other"))
 
 
 @DATASETS.register("daisy_exchanger")
@@ -116,7 +116,7 @@ def daisy_exchanger(folder: Path) -> Dataset:
     Licence: not stated.
     """
     table = _columns(folder, "exchanger", 3)[:, 1:]
-    return _dataset("daisy_exchanger", table, 1.0, Channel("flow"), Channel("temperature"))
+    return _dataset("daisy_exchanger", table, 1.0, Channel("flow"), Channel("temperature", kind="other"))
 
 
 @DATASETS.register("daisy_ballbeam")

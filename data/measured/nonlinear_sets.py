@@ -156,7 +156,7 @@ def wiener_hammerstein(folder: Path) -> Dataset:
     Licence: not stated in the files.
     """
     train, test = _official("WienerHammerBenchMark", folder)
-    channels = _channels(Channel("u", "V"), Channel("y", "V"))
+    channels = _channels(Channel("u", "V"), Channel("y", "V", "other"))
     return _dataset("wiener_hammerstein", _named(["train"], train), _named(["test"], test), channels)
 
 
@@ -208,6 +208,6 @@ def f16(folder: Path) -> Dataset:
     Licence: not stated in the files.
     """
     train, test = _official("F16", folder)
-    channels = _channels(Channel("force", "N"), Channel("acceleration", "m/s^2"))
+    channels = _channels(Channel("force", "N"), Channel("acceleration", "m/s^2", "other"))
     train, test = ({Path(r.name).stem: r for r in records} for records in (train, test))
     return _dataset("f16", train, test, channels)

@@ -1,0 +1,123 @@
+"""A table of one record as a data set: its columns, its sampling time, its pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from simgap.data.formats.clock import Clock, read_clock, time_column
+from simgap.data.formats.description import check_columns
+from simgap.data.formats.gaps import pieces_of
+from simgap.data.formats.headings import heading_of, listed, time_unit
+from simgap.data.formats.sampling import check_clock, sampling_time
+from simgap.data.formats.tables import Table
+from simgap.data.kinds import kind_of
+from simgap.data.splits import assemble, split_in_time, split_pieces
+from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
+
+SEPARATED = {",": "", ";": "semicolons between cells", "\t": "tabs between cells"}
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a user may say about a file: columns, sampling time in s, name, and what to do about uneven time."""
+
+    inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
+    dt: float | None = None
+    name: str | None = None
+    resample: float | None = None
+    split_gaps: bool = False
+
+
+def dataset_of(table: Table, choices: Choices, name: str) -> tuple[Dataset, tuple[str, ...]]:
+    """Make a data set of one record, and say in words what was inferred beside the kinds. Raises UnusableInput."""
+    _check(table, choices)
+    check_columns((*choices.inputs, *choices.outputs), table.source)
+    # A misspelt column is a better answer than a missing sampling time.
+    columns = [table.index(column) for column in (*choices.inputs, *choices.outputs)]
+    inputs = [table.names[i] for i in columns[: len(choices.inputs)]]
+    outputs = [table.names[i] for i in columns[len(choices.inputs) :]]
+    check_columns((*inputs, *outputs), table.source)
+    channels = _channels(table, inputs, outputs)
+    time = time_column(table, set(columns))
+    clock = None if time is None else read_clock(table, time)
+    if clock is not None and (choices.resample is not None or choices.split_gaps):
+        pieces, said = pieces_of(table, clock, inputs, outputs, choices.dt, choices.resample, choices.split_gaps)
+    else:
+        step = _sampling_time(table, clock, choices)
+        pieces, said = (table.experiment("record", inputs, outputs, step),), ()
+    splits = split_in_time(pieces[0]) if len(pieces) == 1 else split_pieces(pieces)
+    dataset = assemble(name, splits, channels, None, table.source)
+    return dataset, _told(table, clock, channels, pieces[0].dt, choices, said)
+
+
+def _check(table: Table, choices: Choices) -> None:
+    for column_list, role in ((choices.inputs, "inputs"), (choices.outputs, "outputs")):
+        if isinstance(column_list, str) or not column_list:
+            raise UnusableInput(
+                f"{table.source}: say which columns are the {role} (--{role[:-1]} NAME, or {role}=[..] in Python); "
+                f"there are {listed(table.names)}{_example(table)}"
+            )
+    for option, seconds in (("dt", choices.dt), ("resample", choices.resample)):
+        if seconds is not None and not 0 < seconds <= LARGEST_VALUE:
+            raise UnusableInput(
+                f"{table.source}: {option} = {seconds} must be a positive number of seconds, such as 0.1"
+            )
+    if choices.dt is not None and choices.resample is not None:
+        raise UnusableInput(f"{table.source}: the sampling time is that of resample; leave out dt")
+
+
+def _example(table: Table) -> str:
+    """Write out the options of a table with two columns beside the time."""
+    rest = [heading_of(name).name for name in table.names if time_unit(name) is None]
+    if len(rest) != 2:
+        return ""
+    one, other = (f'"{name}"' if " " in name else name for name in rest)
+    return f"; if {one} drives {other}, write --input {one} --output {other}, else the other way round"
+
+
+def _channels(table: Table, inputs: Sequence[str], outputs: Sequence[str]) -> Channels:
+    """Name the channels without their units, but where two would then share a name."""
+    names = [table.heading(column).name for column in (*inputs, *outputs)]
+    made = []
+    for column in (*inputs, *outputs):
+        heading = table.heading(column)
+        name = heading.name if names.count(heading.name) == 1 else column
+        kind = kind_of(heading.name, heading.unit) if len(made) >= len(inputs) else None
+        made.append(Channel(name, heading.unit, kind, "header") if kind else Channel(name, heading.unit))
+    return Channels(tuple(made[: len(inputs)]), tuple(made[len(inputs) :]))
+
+
+def _sampling_time(table: Table, clock: Clock | None, choices: Choices) -> float:
+    if clock is None and (choices.resample is not None or choices.split_gaps):
+        raise UnusableInput(f"{table.source}: without a time column there are no gaps and nothing to resample; "
+                            f"call it 't' or 'time'")  # fmt: skip
+    if choices.dt is None and clock is None:
+        raise UnusableInput(
+            f"{table.source}: the sampling time is not known; give dt in seconds or a column 't' or 'time'"
+        )
+    if choices.dt is None:
+        assert clock is not None
+        return sampling_time(clock)
+    if clock is not None:
+        check_clock(clock, choices.dt)
+    return float(choices.dt)
+
+
+def _told(
+    table: Table, clock: Clock | None, channels: Channels, dt: float, choices: Choices, said: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Say what was inferred of the file and its time; nothing of a plain file with a column t or time in seconds."""
+    layout = table.layout
+    about = [SEPARATED[layout.separator]] if layout.separator != "," else []
+    about += ["decimal commas"] if layout.decimal == "," else []
+    about += [f"the header from the comment in row {table.header_row}"] if layout.header_is_comment else []
+    about += [f"units from row {table.first_row - 1}"] if layout.units else []
+    units = any(channel.unit for channel in (*channels.inputs, *channels.outputs))
+    units |= any(channel.kind_from == "header" for channel in channels.outputs)
+    if clock is not None and (about or said or units or clock.counts or clock.column not in ("t", "time")):
+        counts = f", which counts {clock.counts}" if clock.counts else ""
+        what = "time" if choices.resample else f"sampling time {dt:g} s"
+        about.append(f"{what} from column {table.heading(clock.column).name}{counts}")
+    return (*about, *said)

@@ -1,0 +1,99 @@
+"""Units as people write them: whether a text is a unit, what it measures, and how many seconds a unit of time is."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from functools import lru_cache
+
+# What one symbol measures; those of a single letter and those of SI prefixes are told apart by capitals.
+ANGLES = {"rad", "deg", "degree", "degrees", "°", "rev", "revs", "turn", "turns", "arcmin", "arcsec"}
+LENGTHS = {"m", "inch", "inches", "in", "ft"}
+TIMES = {
+    "s": (1, 1), "sec": (1, 1), "secs": (1, 1), "second": (1, 1), "seconds": (1, 1),
+    "ms": (1, 10**3), "msec": (1, 10**3), "milliseconds": (1, 10**3),
+    "us": (1, 10**6), "usec": (1, 10**6), "microseconds": (1, 10**6), "ns": (1, 10**9), "nsec": (1, 10**9),
+    "min": (60, 1), "minutes": (60, 1), "h": (3600, 1), "hr": (3600, 1), "hours": (3600, 1),
+}  # fmt: skip  # seconds as a fraction, so that 10 ms is 0.01 s to the bit
+OTHERS = {
+    "V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "C", "F", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "S", "mol",
+    "VA", "Wh", "Ah", "degC", "degF", "degK", "psi", "lb", "lbf", "dB", "pH", "ppm", "%", "percent", "rh", "volt",
+    "volts", "amp", "amps", "ampere", "newton", "celsius", "kelvin", "mmHg", "oz", "G",
+}  # fmt: skip
+LABELS = {"-", "1", "tick", "ticks", "count", "counts", "pulses", "steps", "lsb", "bit", "bits", "raw", "a.u.", "au"}
+ROTATIONS = {"rpm", "r/min", "u/min", "rev/min"}
+SPEEDS = {"kmh", "kph", "mph"}
+PREFIXED = {"m", "rad", "V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "F",
+            "C", "mol", "VA", "Wh", "Ah"}  # fmt: skip
+PREFIXES = "GMkhdcmunp"
+FACTOR = re.compile(r"([^\d\^\-+]*[^\d\^\-+.]|[-1](?!.))(?:\^?([-+]?\d))?")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a unit measures, as exponents; `other` where anything but angle, length and time is in it."""
+
+    angle: int = 0
+    length: int = 0
+    time: int = 0
+    other: bool = False
+    label: bool = False
+
+
+@lru_cache(maxsize=1000)
+def quantity(unit: str) -> Quantity | None:
+    """Tell what a unit measures; None for a text that is no unit known here."""
+    text = plain(unit)
+    if text.lower() in ROTATIONS:
+        return Quantity(angle=1, time=-1)
+    if text.lower() in SPEEDS:
+        return Quantity(length=1, time=-1)
+    total, sign = {"angle": 0, "length": 0, "time": 0, "other": 0, "label": 0}, 1
+    if not text or len(text) > 30:
+        return None
+    for place, part in enumerate(text.split("/")):
+        sign = -1 if place else 1
+        for factor in part.strip("()").split("*"):
+            match = FACTOR.fullmatch("s" if place and factor == "S" else factor)  # RAD/S is no siemens
+            what = match and _measures(match[1])
+            if not match or what is None:
+                return None
+            total[what] += sign * int(match[2] or 1)
+            total["other"] += what == "other"
+    return Quantity(total["angle"], total["length"], total["time"], total["other"] != 0, total["label"] != 0)
+
+
+def seconds_in(unit: str) -> tuple[int, int] | None:
+    """Give the seconds in a unit of time as numerator and denominator; None for any other unit."""
+    return TIMES.get(_word(plain(unit)))
+
+
+def plain(unit: str) -> str:
+    """Write a unit with plain letters: 'µm' as 'um', '°C' as 'degC', 'rad·s⁻¹' as 'rad*s-1'."""
+    text = unicodedata.normalize("NFKC", unit.replace("º", "°")).strip()
+    text = text.replace("−", "-").replace("μ", "u").replace("**", "^")
+    text = re.sub(r"(?:°|\bdeg\.?)\s*([CFK])\b", r"deg\1", text)
+    text = text.replace("°", "deg")
+    text = re.sub(r"\s*([/*·×⋅])\s*", r"\1", text)
+    return re.sub(r"[·×⋅\s]", "*", text)
+
+
+def _measures(symbol: str) -> str | None:
+    """Name what one symbol measures, without its exponent."""
+    symbol = _word(symbol)
+    for what, symbols in (("angle", ANGLES), ("length", LENGTHS), ("time", TIMES), ("other", OTHERS)):
+        if symbol in symbols:
+            return what
+    if symbol.lower() in LABELS:
+        return "label"
+    base = symbol[1:]
+    if symbol[0] in PREFIXES and base in PREFIXED:
+        return {"m": "length", "rad": "angle"}.get(base, "other")
+    return None
+
+
+def _word(symbol: str) -> str:
+    """Write words of three letters and more small: Rad, SEC, Volts."""
+    small = symbol.lower()
+    return small if len(symbol) > 2 and any(small in words for words in (ANGLES, LENGTHS, TIMES, OTHERS)) else symbol
