@@ -72,13 +72,3 @@ def log_likelihood(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]
     w = noise.whiten(e)[counted] * noise.deviations  # [N, ny]
     variance = np.mean(w * w, axis=0)
     return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, 1e-300))))
-
-
-def correlation_time(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> float:
-    """Count the samples of errors that weigh as one: 1 + 2 sum rho_k up to the first rho_k that is not positive."""
-    x = np.where(mask[:, :, None], e / (np.sqrt(np.mean(e[mask] ** 2, axis=0)) + 1e-300), 0.0)
-    n = 1 << math.ceil(math.log2(2 * x.shape[1]))
-    covariance = np.fft.irfft((np.abs(np.fft.rfft(x, n, axis=1)) ** 2).sum(axis=(0, 2)), n)[: x.shape[1] // 2]
-    rho = covariance / max(covariance[0], 1e-300)
-    end = int(np.argmax(rho <= 0)) if np.any(rho <= 0) else len(rho)
-    return max(1.0, 1 + 2 * float(rho[1:end].sum()))

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.noise import correlation_time, log_likelihood
+from simgap.greybox.noise import log_likelihood
 from simgap.greybox.plant import Term
 from simgap.greybox.score_test import STARTS, candidates
 
@@ -76,9 +76,7 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
 
     2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried.
     """
-    tau = correlation_time(larger.estimate.errors, baseline.train.mask)
-    free_run = 0.5 * baseline.n_errors / tau * math.log(smaller.estimate.squares / larger.estimate.squares)
-    ratio = max(larger.train - smaller.train, free_run)
+    ratio = larger.train - smaller.train
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
     tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried

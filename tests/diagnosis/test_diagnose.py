@@ -8,7 +8,7 @@ import pytest
 
 import simgap
 from simgap.data.simulated.gimbal.recordings import Gimbal, gimbal_dataset
-from simgap.data.simulated.rigs import hide, suitable
+from simgap.data.simulated.rigs import RIGS, hide, suitable
 from simgap.diagnosis.cases import Case, solve
 from simgap.diagnosis.diagnose import diagnose
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
@@ -152,5 +152,5 @@ def test_the_diagnosis_examples_of_the_command_line_are_solved(measured, effect)
 
 
 def test_every_effect_can_be_hidden_somewhere():
-    everywhere = {effect for rig in ("cart", "stage", "slide", "tank", "tanks") for effect in suitable(rig)}
+    everywhere = {effect for rig in RIGS for effect in suitable(rig)}
     assert everywhere == set(simgap.EFFECTS.names())

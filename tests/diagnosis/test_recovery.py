@@ -73,8 +73,8 @@ def test_a_case_that_raises_hangs_or_dies_is_a_row_and_is_computed_again(tmp_pat
 def test_the_digest_covers_rigs_grey_box_and_diagnosis_and_nothing_that_only_shows_or_runs():
     modules = study.closure({"simgap.diagnosis.cases": None}, within=tuple(f"simgap.{r}" for r in study.ROOMS)).digests
     assert {
-        "simgap.data.simulated.rigs", "simgap.data.simulated.rig_kernels", "simgap.diagnosis.diagnose",
-        "simgap.greybox.selection", "simgap.greybox.effects.backlash", "simgap.baselines.greybox_auto",
+        "simgap.data.simulated.rigs", "simgap.data.simulated.rigs.kernels", "simgap.diagnosis.diagnose",
+        "simgap.greybox.selection", "simgap.greybox.effects.backlash", "simgap.baselines.greybox",
     } <= set(modules)  # fmt: skip
     assert not [name for name in modules if name.startswith(("simgap.reports", "simgap.running", "simgap.cli"))]
 

@@ -31,6 +31,9 @@ class LoadFriction(ForceEffect):
     confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "repeat a slow stroke with twice the load: friction that grows with it doubles as well",
         "stribeck_friction": "repeat a slow stroke with twice the load: Stribeck friction stays the same",
+        "quadratic_drag": (
+            "run at two constant speeds, one twice the other: drag becomes four times as large, friction stays the same"
+        ),
         "dead_zone": (
             "hold a load and lower the input slowly: friction that grows with the load keeps it where it stands until "
             "the input has fallen by a share of itself"
