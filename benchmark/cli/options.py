@@ -43,7 +43,7 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
             raise UnusableInput(f"--param {pair}: write it as name=value")
         try:
             params[name] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+        except ValueError:  # TOMLDecodeError, and a date in month 13
             params[name] = text  # a word without quotes
     return params
 

@@ -101,7 +101,7 @@ def _columns(body: bytes, dates: list[int]) -> tuple[Any, ...]:
     # Until 3.0 the usual conversion of pandas could miss the last bit; from 3.1 on there is only the exact one.
     old = tuple(map(int, pd.__version__.split(".")[:2])) < (3, 1)
     exact: dict[str, Any] = {"float_precision": "round_trip"} if old else {}
-    dtype = defaultdict(lambda: np.float64, dict.fromkeys(dates, str)) if dates else np.float64
+    dtype: Any = defaultdict(lambda: np.float64, dict.fromkeys(dates, str)) if dates else np.float64
     frame = pd.read_csv(
         io.BytesIO(body), header=None, dtype=dtype, na_filter=False, skip_blank_lines=False, low_memory=False,
         **exact,

@@ -9,11 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.data.formats.clock import Clock
-from simgap.data.formats.sampling import check_clock, check_steps, rounded, usual_step
+from simgap.data.formats.sampling import GAP, check_clock, check_steps, rounded, usual_step
 from simgap.data.formats.tables import Table
 from simgap.records import Experiment, UnusableInput
 
-GAP = 1.5  # usual steps that are a gap between samples of an even clock
 GAP_IN_UNEVEN_TIME = 10  # usual steps across which nothing is interpolated
 SHORTEST_PIECE = 10  # rows; a shorter piece is left out, and that is said
 MOST_SAMPLES_PER_ROW = 100  # that interpolation makes

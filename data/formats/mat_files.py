@@ -50,7 +50,7 @@ def _arrays(path: Path) -> dict[str, Any]:
 
 def _arrays_of_7_3(path: Path) -> dict[str, Any]:
     try:
-        import h5py
+        import h5py  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise UnusableInput(
             f"{path} is a MATLAB file of version 7.3, which needs h5py; `pip install h5py`, or save it with '-v7'"

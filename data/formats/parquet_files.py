@@ -14,7 +14,7 @@ def read_parquet(path: Path) -> Table:
     import pandas as pd
 
     try:
-        import pyarrow  # noqa: F401
+        import pyarrow  # noqa: F401  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise UnusableInput(
             f"{path}: Parquet needs pyarrow, which is not installed; `pip install pyarrow`, or save the file as CSV"

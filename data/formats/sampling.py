@@ -10,6 +10,7 @@ from simgap.records import UnusableInput
 
 STEP_TOLERANCE = 0.1  # of dt, for each step
 DRIFT_TOLERANCE = 0.01  # of dt, for the mean step
+GAP = 1.5  # usual steps that are a gap between samples of an even clock
 DIGITS = 12  # of a sampling time that is read off a clock
 
 BY_HAND = "split the record there, resample it evenly, or correct the sampling time"
@@ -67,7 +68,7 @@ def check_steps(clock: Clock, dt: float, remedy: str = "") -> None:
         return
     i = int(wrong[0])
     split = "--split-gaps starts a new experiment there (split_gaps=True in Python)"
-    resample = f"--resample {max(dt, 1e-9):.3g} interpolates onto an even grid (resample=.. in Python)"
+    resample = f"--resample {max(dt, 1e-9):.2g} interpolates onto an even grid (resample=.. in Python)"
     now = f"{clock.shown(i)} to {clock.shown(i + 1)}{'' if clock.counts == 'dates' else ' s'}"
     if steps[i] == 0:
         what, help_ = f"time stands still at {now.partition(' to ')[0]}", "delete the repeated row or correct its time"
@@ -76,5 +77,5 @@ def check_steps(clock: Clock, dt: float, remedy: str = "") -> None:
         what, help_ = f"time goes back from {now}", split
     else:
         what, help_ = f"time goes from {now} where a step of {dt:.6g} s is due", f"{split}, {resample}"
-        help_ = help_ if steps[i] > (1 + STEP_TOLERANCE) * dt else resample
+        help_ = help_ if steps[i] > GAP * dt else resample
     raise table.refuse(i + 1, clock.column, f"{what}; {remedy or help_}")

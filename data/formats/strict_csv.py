@@ -32,8 +32,9 @@ def strict_table(path: Path, content: bytes) -> Table:
     header, first = layout.skipped + 1, layout.first_row
     if not names:
         raise UnusableInput(f"{path}: row {header} is empty; it must name the columns")
-    if len(names) == 1 and "|" in names[0]:
-        raise UnusableInput(f"{path}: row {header} is separated by '|'; save the file with commas instead")
+    if len(names) == 1 and (mark := next((mark for mark in "| " if mark in names[0]), "")):
+        why = f"is one column, or cells apart by {mark!r}"
+        raise UnusableInput(f"{path}: row {header} {why}; save the file with commas, semicolons or tabs between cells")
     columns: list[list[str]] = [[] for _ in names]
     blank = 0
     for number, row in enumerate(islice(rows, bool(layout.units), None), start=first):

@@ -114,8 +114,9 @@ def test_an_input_that_never_moves_in_training_is_named(refused_cell):
     assert "3.0 in all 12 rows" in refused_cell(HEADER + "".join(rows), row=None, column="u")
 
 
-def test_a_file_with_bars_is_told_so(refused_cell):
-    assert "'|'" in refused_cell((HEADER + "".join(ROWS)).replace(",", "|"), row=1, column=None)
+@pytest.mark.parametrize("mark", ["|", " "])
+def test_a_file_with_other_marks_between_cells_is_told_so(refused_cell, mark):
+    assert f"apart by {mark!r}" in refused_cell((HEADER + "".join(ROWS)).replace(",", mark), row=1, column=None)
 
 
 @pytest.mark.parametrize("content", ["", "\n\n", "  \n", "\ufeff"])

@@ -42,6 +42,10 @@ def test_uneven_time_is_refused_with_what_helps(refused, t, row, said):
     assert said in sentence
 
 
+def test_splitting_is_not_offered_where_it_would_not_help(refused):
+    assert "--split-gaps" not in refused(frame(UNEVEN), ["u"], ["y"])
+
+
 def test_a_gap_starts_a_new_experiment():
     reading = read(frame(GAP), ["u"], ["y"], split_gaps=True)
     parts = experiments(reading.dataset)
