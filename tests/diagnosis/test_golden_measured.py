@@ -9,7 +9,13 @@ import pytest
 GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
 
 
-@pytest.mark.parametrize("name", GOLDEN["MEASURED"])
+# It takes minutes, because gravity is tried from many poles beside friction that grows with the load.
+SLOW = ("servo_xl330",)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in GOLDEN["MEASURED"]]
+)
 def test_the_answer_about_a_measured_machine_is_what_it_was(name):
     if not GOLDEN["folder_of"](name).is_dir():
         pytest.skip(f"{name} is not at hand: set SIMGAP_DATA to the folder of measured data")
