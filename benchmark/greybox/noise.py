@@ -57,18 +57,28 @@ def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], orde
 
 
 def schwarz_order(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> int:
-    """Choose the memory of errors e by Schwarz' criterion (Schwarz 1978)."""
-    price = 0.5 * e.shape[2] * math.log(int(mask.sum()))
-    return int(np.argmax([log_likelihood(e, mask, order) - order * price for order in range(MAX_ORDER + 1)]))
+    """Choose the memory of errors e by Schwarz' criterion (Schwarz 1978), with the same samples for every order."""
+    n = int(mask[:, MAX_ORDER:].sum())
+    if not n:
+        return 0  # records that short tell nothing of a memory
+    price = 0.5 * e.shape[2] * math.log(n)
+    orders = range(MAX_ORDER + 1)
+    return int(np.argmax([log_likelihood(e, mask, order, MAX_ORDER) - order * price for order in orders]))
 
 
-def log_likelihood(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> float:
-    """Compute the log-likelihood of errors e under the noise of that order that suits them best, up to a constant."""
+def log_likelihood(
+    e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int, skipped: int | None = None
+) -> float:
+    """Compute the log-likelihood of errors e under the noise of that order that suits them best, up to a constant.
+
+    The first samples of each record are not counted: `skipped` of them, else as many as the noise remembers. Orders
+    are compared on the same samples only, because the unit of e enters once for every sample.
+    """
     noise = estimate(e, mask, order)
     if not np.isfinite(noise.deviations).all():
         return -np.inf
     counted = mask.copy()
-    counted[:, :order] = False
+    counted[:, : order if skipped is None else skipped] = False
     w = noise.whiten(e)[counted] * noise.deviations  # [N, ny]
     variance = np.mean(w * w, axis=0)
     return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, 1e-300))))
