@@ -29,9 +29,10 @@ class Outliers:
 def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
     """Flag readings whose error stands out from the median of the five around it.
 
-    The errors of a model that is wrong are large for a while; those of a bad reading only once.
+    The errors of a model that is wrong are large for a while; those of a bad reading only once. Beyond the ends of a
+    record its neighbours are mirrored: the last reading repeated would be its own neighbourhood.
     """
-    padded = np.pad(errors, ((0, 0), (2, 2), (0, 0)), mode="edge")
+    padded = np.pad(errors, ((0, 0), (2, 2), (0, 0)), mode="reflect")
     around = np.median(sliding_window_view(padded, 5, axis=1), axis=-1)
     off = np.where(mask[:, :, None], errors - around, 0.0)
     flags = np.zeros(errors.shape, dtype=bool)
