@@ -45,6 +45,10 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
             params[name] = tomllib.loads(f"value = {text}")["value"]
         except ValueError:  # TOMLDecodeError, and a date in month 13
             params[name] = text  # a word without quotes
+        except (ValueError, RecursionError) as error:  # a number of thousands of digits, lists in lists without end
+            raise UnusableInput(
+                f"--param {name}: {text[:40]}... is too long or too deep to read; give a shorter value"
+            ) from error
     return params
 
 
