@@ -43,9 +43,15 @@ def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> 
     return flags
 
 
-def find_outliers(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
-    """Find outputs with enough readings that are off: log-likelihood of errors of two sizes against one size."""
+def find_outliers(
+    errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], resolution: float | np.ndarray = 0.0
+) -> list[Outliers]:
+    """Find outputs with enough readings that are off: log-likelihood of errors of two sizes against one size.
+
+    `resolution` is the smallest error of each output that means anything.
+    """
     flags = flag(errors, mask)
+    least = np.broadcast_to(resolution, errors.shape[2:])
     outliers = []
     for j in range(errors.shape[2]):
         e, bad = errors[:, :, j][mask], flags[:, :, j][mask]
@@ -53,6 +59,8 @@ def find_outliers(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E
         if count < FEWEST or count > 0.2 * n:
             continue
         one, good, far = np.std(e), np.std(e[~bad]), np.sqrt(np.mean(e[bad] ** 2))
+        if not far > good > 0 or far <= least[j]:
+            continue  # they stand out from their neighbours, but are no larger than the others
         rate = count / n
         ratio = n * np.log(one) - (n - count) * np.log(good / (1 - rate)) - count * np.log(far / rate)
         if ratio > 15:
