@@ -24,6 +24,8 @@ BLOCKS = 20
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
 MATTERS_AT_ALL = 0.003  # of what the plain model has
+# Share of the squared error that an effect must take to be tried together with others.
+PROMISING = 0.2
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
 
@@ -45,6 +47,11 @@ class Trial:
     def names(self) -> tuple[str, ...]:
         """The names of the effects."""
         return tuple(term.effect.name for term in self.terms)
+
+    @property
+    def cost(self) -> int:
+        """Parameters that were estimated in training."""
+        return self.k + self.k_train
 
     @property
     def score(self) -> float:
@@ -72,18 +79,25 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     )  # fmt: skip
 
 
-def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+def significant(baseline: Baseline, smaller: Trial, larger: Trial, together: int = 1) -> bool:
     """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
 
-    2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried.
+    2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried, when
+    so many effects are added together.
     """
     ratio = larger.train - smaller.train
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
-    tried = len(candidates(baseline, smaller.terms)) * STARTS
+    tried = (len(candidates(baseline, smaller.terms)) * STARTS) ** together
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
     gain = smaller.estimate.squares - larger.estimate.squares
     matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.squares
     return bool(matters and chance < FALSE_NAMES and holds_out(baseline, smaller, larger))
+
+
+def promises(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether the larger model simulates much better, in training and in held-out data, whatever it forecasts."""
+    less = larger.estimate.squares < (1 - PROMISING) * smaller.estimate.squares
+    return less and larger.k_valid == smaller.k_valid and holds_out(baseline, smaller, larger)
 
 
 def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
@@ -97,13 +111,20 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:
-    """Sort trials, the best first; but of those that fit alike, the one with the fewest parameters."""
+    """Sort trials, the best first; but a simpler one that simulates as well comes before it."""
     best_first = sorted(trials, key=lambda trial: -trial.score)
     if not best_first:
         return []
     best = best_first[0]
-    alike = [t for t in best_first if t.estimate.squares < (1 + ALIKE) * best.estimate.squares]
-    simplest = min(alike, key=lambda trial: trial.k + trial.k_train)
-    if simplest.k + simplest.k_train == best.k + best.k_train:
+    first = min((trial for trial in best_first if simulates_as_well(trial, best)), key=lambda trial: trial.cost)
+    if first.cost == best.cost:
         return best_first
-    return [simplest, *(trial for trial in best_first if trial is not simplest)]
+    return [first, *(trial for trial in best_first if trial is not first)]
+
+
+def simulates_as_well(one: Trial, other: Trial) -> bool:
+    """Tell whether one model fits like another, or is at most a standard error worse in held-out simulations."""
+    if one.estimate.squares < (1 + ALIKE) * other.estimate.squares:
+        return True
+    worse = one.blocks - other.blocks
+    return bool(worse.mean() <= worse.std() / math.sqrt(len(worse)))
