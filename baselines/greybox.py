@@ -32,7 +32,7 @@ class GreyBox(GreyBoxModel):
         self.plants = []
         placed = [_place(name, data) for name in self.effects]
         for outputs in plants_of(data.channels):
-            baseline = find_baseline(data.train, data.valid, data.channels, outputs)
+            baseline = find_baseline(data.train, data.valid, data.channels, outputs, data.n_init)
             estimate = baseline.estimate
             for effect, plant, channel in placed:
                 # What is not simulated is left out of the records by the baseline itself.

@@ -81,7 +81,7 @@ class Problem:
             for i in range(plant.order - 2, -1, -1):
                 rate = max(theta[i], SLOWEST / plant.dt)
                 local[:, i] = local[:, i + 1] * theta[i + 1] / rate
-        else:
+        elif plant.order:
             local[:, 0] = first[:, 0]
         return local
 
@@ -91,9 +91,9 @@ class Problem:
         A reading without a sign does not tell the two apart, and no descent leads from one to the other.
         """
         sides = np.ones(local.shape[1])
-        sides[: self.plant.order] = -1
+        sides[: self.plant.n_start] = -1
         guess = local.copy()
-        guess[:, : self.plant.order] = self.at_rest(theta)[:, : self.plant.order]
+        guess[:, : self.plant.n_start] = self.at_rest(theta)[:, : self.plant.n_start]
         starts = np.stack([local, local * sides, guess, guess * sides])  # [4, E, q]
         squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
         return starts[np.argmin(squares, axis=0), np.arange(len(local))]
@@ -103,8 +103,9 @@ class Problem:
         plant, which = self.plant, np.flatnonzero(which)
         sizes, high = self.sizes(theta), plant.high
         steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
-        starts = [DIFFERENCE * self._sizes[0] * (plant.dt**-i if not plant.cascade else 1.0)
-                  for i in range(plant.order)]  # fmt: skip
+        unit = 1.0 if plant.imposed else self._sizes[0]
+        starts = [DIFFERENCE * unit * (1.0 if plant.cascade or plant.imposed else plant.dt**-i)
+                  for i in range(plant.n_start)]  # fmt: skip
         thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
@@ -125,7 +126,7 @@ class Problem:
         of_local = np.zeros((plant.n_local, len(here), m))
         for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
             of_local[i] = slope(moved, step)
-        for i, term in enumerate(plant.per_experiment, start=plant.order):
+        for i, term in enumerate(plant.per_experiment, start=plant.n_start):
             step = self._sizes[term.channel] / self.records.duration
             moved = local.copy()
             moved[:, i] += step
@@ -267,13 +268,10 @@ class _OneByOne:
 
 
 def initial_states(
-    plant: Plant,
-    theta: Float[np.ndarray, " p"],
-    u: Float[np.ndarray, "B n nu"],
-    y: Float[np.ndarray, "B n ny"],
-    noise: Noise,
+    plant: Plant, theta: Float[np.ndarray, " p"], records: Records, noise: Noise
 ) -> Float[np.ndarray, "B q"]:
-    """Find the states at the first sample of each record from its n measured samples; the model is known."""
-    records = Records(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), plant.dt)
+    """Find the states at the first sample of records of a few samples; the model is known."""
+    if not plant.n_local:
+        return np.zeros((len(records.u), 0))
     fixed = np.ones(plant.size, dtype=bool)
     return Problem(plant, records, noise).fit(theta, fixed=fixed, max_steps=INITIAL_STEPS).local

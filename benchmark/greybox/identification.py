@@ -28,7 +28,8 @@ class Identified:
 def identify(data: TrainingSet) -> list[Identified]:
     """Select effects on excerpts of the training data, then fit them to all of it, plant by plant."""
     selections = [
-        select(find_baseline(data.train, data.valid, data.channels, outputs)) for outputs in plants_of(data.channels)
+        select(find_baseline(data.train, data.valid, data.channels, outputs, data.n_init))
+        for outputs in plants_of(data.channels)
     ]
     experiments = data.train + data.valid
     return [Identified(s, FittedPlant.fit(s.trial.estimate, s.baseline, experiments)) for s in selections]

@@ -172,6 +172,42 @@ def run_plant(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registe
                 step += 1
 
 
+@njit(
+    types.void(
+        _matrix, _matrix, types.float64, types.UniTuple(types.FunctionType(TERM), SLOTS), types.int64, _places,
+        types.float64[::1], _places, _places, _matrix, types.float64[::1], _cube,
+    ),
+    cache=True, nogil=True,
+)  # fmt: skip
+def follow_motion(drive, motion, dt, terms, n_terms, roles, theta, p_at, m_at, begun, memory, states):
+    """Fill states [E, T, 2] with the force that an imposed motion [E, T] takes, and with the rate of the drive [E, T].
+
+    Between two samples the motion is even. Where it stands still, dry friction goes on holding as it did before.
+    """
+    for experiment in range(len(drive)):
+        for i in range(len(memory)):
+            memory[i] = begun[experiment, i]
+        side = 0.0
+        for k in range(drive.shape[1]):
+            x, v, rate = motion[experiment, k], 0.0, 0.0
+            if k > 0:
+                v = (x - motion[experiment, k - 1]) / dt
+                rate = (drive[experiment, k] - drive[experiment, k - 1]) / dt
+            if v != 0.0:
+                side = 1.0 if v > 0.0 else -1.0
+            force = drive[experiment, k]
+            for q in range(n_terms):
+                if roles[q] == FORCE:
+                    force -= terms[q](x, v, k * dt, dt, theta, p_at[q], memory, m_at[q])
+            for q in range(n_terms):
+                if roles[q] == FRICTION:
+                    if m_at[q] < m_at[q + 1]:
+                        memory[m_at[q]] = abs(force)
+                    force += side * terms[q](x, v, k * dt, dt, theta, p_at[q], memory, m_at[q])
+            states[experiment, k, 0] = force
+            states[experiment, k, 1] = rate
+
+
 # The compiled function itself: numba would work out the types of the terms anew at every call, which takes longer than
 # most simulations. Whoever calls it keeps to the one signature.
 run_plant_directly = run_plant.overloads[run_plant.signatures[0]].entry_point

@@ -44,8 +44,8 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     """Regress the errors on what forces of many shapes would do to the output, filtered through the linear plant."""
     plant, problem = estimate.plant, Problem(estimate.plant, records, white(records.sizes))
     n, order = len(records.u), plant.order
-    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, :order])[0]  # [E, T, n]
-    names, phi = library(plant, states, records.u)
+    x, v = problem.simulator.motion(estimate.theta, estimate.local)  # [E, T]
+    names, phi = library(plant, x, v, records.u)
     plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs)
     simulator = Simulator(plain, np.ascontiguousarray(phi))
     theta = np.zeros(plain.size)
@@ -53,16 +53,15 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
         theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
-    responses = np.moveaxis(simulator.run_many(thetas, np.zeros((len(names), n, order)))[..., 0], 0, 2)  # [E, T, f]
+    responses = np.moveaxis(simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))[..., 0], 0, 2)  # [E, T, f]
     jacobian = problem.jacobian(estimate.theta, estimate.local, plant.free)
     share = _predicted(estimate, records, responses, jacobian)
     mask = records.mask
     return Leftover(names, phi[mask], responses[mask], estimate.errors[..., 0][mask], share)
 
 
-def library(plant: Plant, states: np.ndarray, u: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+def library(plant: Plant, x: np.ndarray, v: np.ndarray, u: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     """Shapes of a missing force in x, v and the inputs, each scaled to rms 1."""
-    x, v = states[..., 0], states[..., min(1, plant.order - 1)]
     x, v = (signal / sizes_of(signal.reshape(-1, 1))[0] for signal in (x, v))
     shapes = {"x^2": x * x, "x^3": x**3, "v |v|": v * np.abs(v), "sign v": np.tanh(10 * v), "v^3": v**3, "v^2": v * v}
     if plant.order > 1:

@@ -10,7 +10,7 @@ import numpy as np
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate, Problem, initial_states
 from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
@@ -30,21 +30,24 @@ EARLY = 0.25  # samples
 
 
 def find_baseline(
-    train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]
+    train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int], n_init: int
 ) -> Baseline:
-    """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput."""
+    """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput.
+
+    Held-out records are simulated from their first n_init samples, as the test will be.
+    """
     check_numbers([*train, *valid], channels)
     records = Records.of(excerpts(train), outputs)
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
     kind = channels.outputs[outputs[0]].kind
-    models = plain_models(records, held_out, kind)
+    models = plain_models(records, held_out, kind, n_init)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
     outliers = [] if stepped else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
-        held_out = without_outliers(held_out, errors_on(models[-1], held_out), outliers) if valid else records
-        models = plain_models(records, held_out, kind)
+        held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
+        models = plain_models(records, held_out, kind, n_init)
 
     def baseline_of(plain: Estimate) -> Baseline:
         problem = Problem(plain.plant, records, white(records.sizes))
@@ -52,24 +55,19 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), replace(plain, plant=plant), cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
-    to_beat = _held_out_error(baseline, baseline.estimate)
+    to_beat = block_errors(baseline.estimate, baseline.valid, n_init).mean()
     for simpler in (fit for fit in models[:-1] if not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost no more, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if term.effect.instead_of_order and not term.channel]
-        if any(_held_out_error(other, add(other, other.estimate, term)) <= to_beat for term in instead):
+        if any(block_errors(add(other, other.estimate, term), held_out, n_init).mean() <= to_beat for term in instead):
             baseline = other
             break
-    smooth = first_order_hold(baseline.estimate, records, held_out)
+    smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
 
 
-def _held_out_error(baseline: Baseline, fit: Estimate) -> float:
-    """Mean square of held-out simulations."""
-    return float(block_errors(fit, baseline.valid).mean())
-
-
-def plain_models(train: Records, valid: Records, kind: Kind) -> list[Estimate]:
+def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> list[Estimate]:
     """Fit plain linear models: order 1 for a velocity, 2 for a position, else up to what held-out data ask for.
 
     The last one is the simplest whose held-out error is within a standard error of the best.
@@ -81,13 +79,13 @@ def plain_models(train: Records, valid: Records, kind: Kind) -> list[Estimate]:
         ]
     tried: list[tuple[Estimate, np.ndarray]] = []
     smaller, rounds_in_vain = None, 0
-    for order in range(1, MAX_ORDER + 1):
+    for order in range(kind == "level", MAX_ORDER + 1):
         here = []
-        for zeros in sorted({0, 0 if kind == "level" else order - 1}):
+        for zeros in {0: (0, 1), 1: (0,)}.get(order, (0,) if kind == "level" else (0, order - 1)):
             plant = Plant(kind, order, nu, dt, zeros=zeros, offset=True)
             grid = order <= 2 and not zeros
             fit = fit_plain(plant, train, None if grid else here[0][0] if zeros else smaller)
-            here.append((fit, block_errors(fit, valid)))
+            here.append((fit, block_errors(fit, valid, n_init)))
         known = min((squares.mean() for _, squares in tried), default=np.inf)
         tried += here
         smaller = here[0][0]
@@ -107,7 +105,7 @@ def plain_models(train: Records, valid: Records, kind: Kind) -> list[Estimate]:
     return chosen
 
 
-def first_order_hold(held: Estimate, train: Records, valid: Records) -> Estimate | None:
+def first_order_hold(held: Estimate, train: Records, valid: Records, n_init: int) -> Estimate | None:
     """Fit the model with an input that runs on smoothly between samples; None where the records show a held one.
 
     Seen from held samples, such an input comes half a sample early: the mean time of its gains, zeros included,
@@ -123,7 +121,7 @@ def first_order_hold(held: Estimate, train: Records, valid: Records) -> Estimate
     early += float(np.sum(theta[plant.layout.zeros][:1]) - np.sum(held.theta[held.plant.layout.zeros][:1])) / plant.dt
     likely = [log_likelihood(fit.errors, train.mask, 1, train.resolution) for fit in (smooth, held)]
     gain = likely[0] - likely[1]
-    better = block_errors(smooth, valid).mean() < block_errors(held, valid).mean()
+    better = block_errors(smooth, valid, n_init).mean() < block_errors(held, valid, n_init).mean()
     return smooth if early > EARLY and gain > SMOOTH * plant.nu and better else None
 
 
@@ -139,15 +137,16 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
     return Problem(plant, train, noise).fit(theta, held.local)
 
 
-def errors_on(fit: Estimate, records: Records) -> np.ndarray:
-    """Simulate other records with a fitted model, each from the best initial state: errors [E, T, ny]."""
-    fixed = np.ones(fit.plant.size, dtype=bool)
-    return Problem(fit.plant, records, white(records.sizes)).fit(fit.theta, fixed=fixed, max_steps=10).errors
+def errors_on(fit: Estimate, records: Records, n_init: int) -> np.ndarray:
+    """Simulate other records with a fitted model, each from its first n_init samples: errors [E, T, ny]."""
+    noise = white(records.sizes)
+    start = initial_states(fit.plant, fit.theta, records.beginning(n_init), noise)
+    return Problem(fit.plant, records, noise).errors(fit.theta, start)
 
 
-def block_errors(fit: Estimate, valid: Records) -> np.ndarray:
+def block_errors(fit: Estimate, valid: Records, n_init: int) -> np.ndarray:
     """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks."""
-    errors = errors_on(fit, valid) / valid.sizes
+    errors = errors_on(fit, valid, n_init) / valid.sizes
     squares = np.where(valid.mask[:, :, None], errors**2 + RESOLUTION**2, 0.0)
     blocks = np.array_split(squares, min(max(2, BLOCKS // len(squares)), squares.shape[1]), axis=1)
     return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

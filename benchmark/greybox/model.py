@@ -52,7 +52,7 @@ class FittedPlant:
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate rows n .. T-1, from the initial state that suits the n measured samples best."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
-        start = initial_states(plant, theta, u[:, :n], y_init, self.noise)
+        start = initial_states(plant, theta, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
         return Simulator(plant, u).run(theta, start)[:, n:]
 
     def contributions(
@@ -62,7 +62,7 @@ class FittedPlant:
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         if not plant.terms:
             return np.zeros((*u.shape[:2], 0))
-        start = initial_states(plant, theta, u[:, :n], y_init, self.noise)
+        start = initial_states(plant, theta, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
         whole = Simulator(plant, u).run(theta, start)
         contributions = []
         for term in plant.terms:

@@ -10,7 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
 from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
 
@@ -85,6 +85,8 @@ class Plant:
         x^(n) + .. + a0 x = b u + d + forces,   y = x + c1 x' + ..   (and, for two outputs, y2 = g x')
 
     Cascade of tanks (level): x_i' = inflow - a_i x_i, each tank's outflow the next one's inflow, y = x_n.
+
+    Order 0, a motion imposed on the machine and the force that it takes: y = b u + c1 b u' + d - forces(u, u').
     """
 
     kind: Kind
@@ -110,6 +112,11 @@ class Plant:
     def sign_hidden(self) -> bool:
         """Whether a reading does not tell on which side of zero it is."""
         return any(term.effect.hides_sign for term in self.terms)
+
+    @property
+    def imposed(self) -> bool:
+        """Whether the first input is a motion and the output the force that it takes, without dynamics."""
+        return self.order == 0
 
     @property
     def cascade(self) -> bool:
@@ -160,13 +167,20 @@ class Plant:
         return tuple(term for term in self.terms if term.effect.time_power is not None)
 
     @property
+    def n_start(self) -> int:
+        """Length of the initial state: an imposed motion starts with what its forces remember, -1 to 1 each."""
+        if self.imposed:
+            return sum(term.effect.memory for term in self.forces if term.effect.role == "force")
+        return self.order
+
+    @property
     def n_local(self) -> int:
         """Numbers estimated in every experiment: the initial state, then one for each term of its own."""
-        return self.order + len(self.per_experiment)
+        return self.n_start + len(self.per_experiment)
 
     def local_index(self, term: Term) -> int:
         """Return where the parameter of a per-experiment term stands among the numbers of an experiment."""
-        return self.order + self.per_experiment.index(term)
+        return self.n_start + self.per_experiment.index(term)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -216,7 +230,8 @@ class Plant:
         carried = np.zeros(self.size)
         carried[: self.n_linear] = theta[: self.n_linear]
         numbers = np.zeros((len(local), self.n_local))
-        numbers[:, : self.order] = local[:, : self.order]
+        if self.n_start == smaller.n_start:
+            numbers[:, : self.n_start] = local[:, : self.n_start]
         for term in self.terms:
             if term not in smaller.terms:
                 continue
@@ -235,7 +250,7 @@ class Plant:
     @cached_property
     def substeps(self) -> int:
         """Substeps per sample: what the most demanding term asks for."""
-        return max((term.effect.substeps for term in self.terms), default=1)
+        return 1 if self.imposed else max((term.effect.substeps for term in self.terms), default=1)
 
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """Return A of z' = A z + (inputs and forces)."""
@@ -250,7 +265,9 @@ class Plant:
         return a
 
     def reading(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "ny n"]:
-        """Return C of y = C z, before the sensors' effects."""
+        """Return C of y = C z, before the sensors' effects; z = (force, rate of the drive) of an imposed motion."""
+        if self.imposed:
+            return np.array([[1.0, *theta[self.layout.zeros], 0.0][:2]])
         c = np.zeros((self.ny, self.order))
         if self.cascade:
             c[0, -1] = 1.0
@@ -264,4 +281,4 @@ class Plant:
     @property
     def forces(self) -> list[Term]:
         """The terms that act in the plant."""
-        return [term for term in self.terms if isinstance(term.effect, ForceEffect)]
+        return [term for term in self.terms if term.effect.port == "force"]

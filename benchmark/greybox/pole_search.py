@@ -79,8 +79,8 @@ def denominator_grid(plant: Plant, records: Records, coarse: bool = False) -> It
     if plant.cascade:
         choose = combinations_with_replacement if coarse else combinations
         yield from (list(chosen) for chosen in choose(rates[::-1], plant.order))
-    elif plant.order == 1:
-        yield from ([rate] for rate in rates)
+    elif plant.order <= 1:
+        yield from ([rate][: plant.order] for rate in rates[: 1 if plant.imposed else None])
     else:
         sections = [[2 * damping * w, w * w] for w in np.geomspace(2 / duration, 2.5 / dt, 9)
                     for damping in (0.05, 0.3, 1.0)]  # fmt: skip

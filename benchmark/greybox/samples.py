@@ -43,6 +43,11 @@ class Records:
             experiments[0].dt,
         )
 
+    @classmethod
+    def measured(cls, u: Float[np.ndarray, "E T nu"], y: Float[np.ndarray, "E T ny"], dt: float) -> Records:
+        """Take records of one length, with every sample measured."""
+        return cls(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), dt)
+
     @cached_property
     def sizes(self) -> Float[np.ndarray, " ny"]:
         """Sizes of the outputs, in their units."""
@@ -61,6 +66,10 @@ class Records:
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
         return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt)
+
+    def beginning(self, samples: int) -> Records:
+        """Return the first samples of each experiment."""
+        return Records(np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt)
 
     @property
     def duration(self) -> float:

@@ -21,15 +21,13 @@ ON_GRID = 0.999
 def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> PlantScales:
     """Measure the scales that effects choose bounds and starts by, for each input and each of the plant's outputs."""
     plant, records = estimate.plant, problem.records
-    states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, : plant.order])[0][
-        records.mask
-    ]  # [N, n]
+    x, v = (signal[records.mask] for signal in problem.simulator.motion(estimate.theta, estimate.local))  # [N]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     # What would move the output by its size within the longest record, where the input does nothing.
     force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (1 if plant.cascade else plant.order)
     size = float(records.sizes[0])
-    x_max = float(np.max(np.abs(states[:, -1 if plant.cascade else 0]))) or size
-    v_max = float(np.max(np.abs(states[:, min(1, plant.order - 1)]))) or size / records.duration
+    x_max = float(np.max(np.abs(x))) or size
+    v_max = float(np.max(np.abs(v))) or size / records.duration
 
     def scales(i: int, j: int) -> SignalScales:
         u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
@@ -37,7 +35,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             kind=plant.kind, order=plant.order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
-            x_max=x_max, v_max=v_max, stroke=_stroke(plant.order, x_max, v_max, records, states),
+            x_max=x_max, v_max=v_max, stroke=x_max if plant.order != 1 else _stroke(x, v_max, records),
             force_rms=force,
             u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
             lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
@@ -46,11 +44,9 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     return PlantScales(tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny)))
 
 
-def _stroke(order: int, x_max: float, v_max: float, records: Records, states: np.ndarray) -> float:
-    if order > 1:
-        return x_max
+def _stroke(v: np.ndarray, v_max: float, records: Records) -> float:
     # Where only a velocity is measured: its integral between two changes of sign, at most.
-    crossings = np.flatnonzero(np.diff(np.sign(states[:, 0])) != 0)
+    crossings = np.flatnonzero(np.diff(np.sign(v)) != 0)
     longest = np.max(np.diff(crossings), initial=10)
     return v_max * records.dt * float(min(longest, 200)) * 0.5
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numba import cfunc
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect
-from simgap.greybox.kernels import SLOTS, TERM, run_plant_directly, transition
+from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_plant_directly, transition
 from simgap.greybox.plant import Plant
 
 ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3}
@@ -61,12 +61,16 @@ class Simulator:
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory, *([memory[-1]] * unused)])  # one more: where the last one's memory ends
         self._memory = np.zeros(max(1, int(memory[-1])))
+        ends = zip(forces, memory, memory[1:], strict=False)
+        self._remembered = [m for term, at, end in ends if term.effect.role == "force" for m in range(at, end)]
 
     def states(
         self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E n"]
     ) -> Float[np.ndarray, "S E T n"]:
         """Simulate the states at the samples, the first being the start, for each of several thetas."""
         plant, (experiments, samples, _) = self.plant, self.shape
+        if plant.imposed:
+            return np.stack([self._forces(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
         e, g0, g1 = np.empty((3, s, n, n))
         rates = np.empty((s, n))
@@ -86,6 +90,26 @@ class Simulator:
             np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
+
+    def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
+        """Compute the forces that the motion takes, and the rates of the drive."""
+        states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
+        begun[:, self._remembered] = np.clip(start, -1.0, 1.0)
+        follow_motion(
+            self.drive(theta), np.ascontiguousarray(self.arriving(theta, 0)), self.h, self._terms, self._n_terms,
+            self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
+        )  # fmt: skip
+        return states
+
+    def motion(
+        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]
+    ) -> tuple[Float[np.ndarray, "E T"], Float[np.ndarray, "E T"]]:
+        """Simulate position and velocity, as the forces see them."""
+        if self.plant.imposed:
+            x = self.arriving(theta, 0)
+            return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
+        states = self.states(theta[None], local[None, :, : self.plant.n_start])[0]
+        return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
     def drive(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
         """Compute b u + d after the actuators' effects, for every substep."""
@@ -140,7 +164,7 @@ class Simulator:
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
     ) -> Float[np.ndarray, "S E T ny"]:
         """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
-        starts = locals_[:, :, : self.plant.order]
+        starts = locals_[:, :, : self.plant.n_start]
         keys = [t[self.plant.moves_states].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
         new = {key: i for i, key in enumerate(keys) if key not in self._known}
         with np.errstate(over="ignore", invalid="ignore"):

@@ -31,7 +31,7 @@ from .parts import channels, records, term
 
 def plain_search(train, valid, kind, ny=1):
     """A search with its plain model, before any effect was tried."""
-    return linear.find_baseline(train, valid, channels(kind, ny), tuple(range(ny)))
+    return linear.find_baseline(train, valid, channels(kind, ny), tuple(range(ny)), 10)
 
 
 def candidates(search, *present):
@@ -155,7 +155,7 @@ def order_of(search):
 def orders_tried(train, valid, kind):
     """Orders of the plain models, the chosen one last, before any other law of the plant is tried."""
     ny = train[0].y.shape[1]
-    models = linear.plain_models(Records.of(train, range(ny)), Records.of(valid, range(ny)), kind)
+    models = linear.plain_models(Records.of(train, range(ny)), Records.of(valid, range(ny)), kind, 10)
     return [model.plant.order for model in models]
 
 
@@ -170,7 +170,7 @@ def order_chosen(blocks_of):
         return np.asarray(blocks_of[fit.plant.order], dtype=float)
 
     with patch.object(linear, "fit_plain", fitted), patch.object(linear, "block_errors", errors):
-        return linear.plain_models(nothing, nothing, "other")[-1].plant.order
+        return linear.plain_models(nothing, nothing, "other", 10)[-1].plant.order
 
 
 def runs_on(search):

@@ -155,7 +155,7 @@ def own_numbers_of_each(made, data, weighing):
 
 def initial_states(made, data, weighing):
     """The states [E, q] at the first sample of each record."""
-    return fitting.initial_states(made.plant, made.theta, data.u, data.y, weighing)
+    return fitting.initial_states(made.plant, made.theta, data, weighing)
 
 
 # ------------------------------------------------------------------ what is seen before and after a search

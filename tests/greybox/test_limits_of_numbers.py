@@ -17,7 +17,7 @@ from .plants import free_run, steps, velocity
 
 def baseline_of(y, u, kind="velocity") -> Baseline:
     made = experiments(u, y, 0.1)
-    return find_baseline(made[:-1], made[-1:], channels(kind), (0,))
+    return find_baseline(made[:-1], made[-1:], channels(kind), (0,), 10)
 
 
 def test_data_without_noise_have_no_effects_and_no_outliers():

@@ -48,7 +48,8 @@ class SignalScales:
 
     def unit(self, length: int, s: int) -> str:
         """Write the unit L^length s^s, where L is the output's unit or, for a velocity, that of its integral."""
-        base, rate = (self.y_unit.removesuffix("/s"), length) if self.y_unit.endswith("/s") else (self.y_unit, 0)
+        unit = self.u_unit if self.order == 0 else self.y_unit  # an imposed motion is an input
+        base, rate = (unit.removesuffix("/s"), length) if unit.endswith("/s") else (unit, 0)
         if self.kind == "velocity" and not rate:
             s += length  # the output's unit is that of a velocity whatever it is called
         if self.kind != "velocity":
@@ -65,12 +66,14 @@ class SignalScales:
     @property
     def force_unit(self) -> str:
         """Unit of the forces on the plant: that of the highest derivative."""
+        if self.order == 0:
+            return self.y_unit
         return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
 
     @property
     def velocity_unit(self) -> str:
         """Unit of the velocity that the force terms see."""
-        return self.unit(1, -1 if self.order > 1 or self.kind == "velocity" else 0)
+        return self.unit(1, -1 if self.order != 1 or self.kind == "velocity" else 0)
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,16 @@ class Parameter:
     low: float
     high: float
     fixed: bool = False
+
+    @classmethod
+    def absent(cls, name: str) -> Parameter:
+        """Return a parameter that an effect has on other plants only; it is zero, and no answer shows it."""
+        return cls(name, "", 0.0, 0.0, fixed=True)
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether the effect does without it on this plant."""
+        return self.fixed and self.low == self.high == 0.0
 
 
 class Start(NamedTuple):
