@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from simgap.diagnosis import checks, gains
+from simgap.diagnosis import checks, doubts, gains
 from simgap.diagnosis.answer import Diagnosis
 from simgap.error_views.views import views
 from simgap.findings import Cause, Findings, Offer, Trace, Verdict, Wrong
@@ -59,12 +59,14 @@ def diagnose(
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     after = [model.simulate_anew(x, dataset.n_init) for x in dataset.test]
     evidence = [Evidence(one, dataset.channels) for one in identified]
-    causes = _causes(evidence, profiles)
+    doubt = _doubt(evidence, dataset)
+    causes = () if doubt else _causes(evidence, profiles)
     left, offers = _left(evidence, dataset)
     explained = min((plant.explained for plant in evidence), default=0.0) if causes else 0.0
     verdict: Verdict = "named" if causes else "nothing_found"
-    if left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained:
+    if not doubt and left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained:
         verdict, causes = "unexplained", ()
+    if not causes:
         after = before
     findings = Findings(
         dataset=dataset.name,
@@ -78,13 +80,21 @@ def diagnose(
         units={channel.name: channel.unit for channel in dataset.channels.outputs},
         inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
-        checks=checks.look(dataset),
+        checks=(*doubt, *checks.look(dataset)),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, after),
         seed=seed,
     )
     return Diagnosis(findings, time.perf_counter() - begin, model)
+
+
+def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
+    """Say why nothing can be named on these records, if so."""
+    training = dataset.training
+    said = [doubts.shows_controller((*training.train, *training.valid), dataset.channels)]
+    said += [doubts.beaten_by_mean(plant.selection, dataset.channels) for plant in evidence]
+    return tuple(sentence for sentence in said if sentence)
 
 
 def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:

@@ -16,6 +16,7 @@ from simgap.greybox.plant import Plant, Term
 from simgap.greybox.samples import Records
 
 MAX_STEPS = 40
+ENOUGH_EXPERIMENTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,11 @@ class Baseline:
         return self.estimate.plant
 
     @property
+    def repeated(self) -> bool:
+        """Whether enough whole experiments are at hand to tell what changes from one to the next."""
+        return not self.cut and len(self.train.u) >= ENOUGH_EXPERIMENTS
+
+    @property
     def resolution(self) -> Float[np.ndarray, " ny"]:
         """The smallest error of each output that means anything, in training and in held-out data."""
         return self.train.resolution
@@ -48,6 +54,14 @@ class Baseline:
     def squares(self) -> float:
         """Squared errors of the plain model, weighted as those of all other models."""
         return self.problem(self.plant).squares(self.estimate.errors)
+
+    @cached_property
+    def squares_of_mean(self) -> float:
+        """Squared errors of a model that knows the mean of each held-out record and no more, weighted as the others."""
+        valid = self.valid
+        known = valid.mask[:, :, None]
+        means = np.sum(np.where(known, valid.y, 0.0), axis=1, keepdims=True) / known.sum(axis=1, keepdims=True)
+        return float(np.sum(np.where(known, self.noise.whiten(valid.y - means), 0.0) ** 2))
 
     @property
     def n_errors(self) -> int:

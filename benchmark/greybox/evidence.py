@@ -57,10 +57,21 @@ class Evidence:
         return 1 - self.selection.trial.estimate.squares / self.selection.baseline.squares
 
     @cached_property
-    def _losses(self) -> list[tuple[Term, Trial]]:
-        """Every effect with the model that does without it, the most missed first."""
-        without = [(term, self.selection.without(term)) for term in self.selection.trial.terms]
-        return sorted(without, key=lambda pair: -pair[1].estimate.squares)
+    def _in_order(self) -> list[tuple[Term, float]]:
+        """Every effect with the share of the error that it takes on top of those before it.
+
+        What takes most of the held-out error is next: it is what training has not been fitted to.
+        """
+        selection = self.selection
+        left, before, listed = list(selection.trial.terms), selection.baseline.squares, []
+        while left:
+            known = [term for term, _ in listed]
+            fits = [(term, selection.only([*known, term])) for term in left]
+            term, fit = min(fits, key=lambda pair: float(pair[1].blocks.sum()))
+            listed.append((term, (before - fit.estimate.squares) / selection.baseline.squares))
+            left.remove(term)
+            before = fit.estimate.squares
+        return listed
 
     @cached_property
     def _intervals(self) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +80,7 @@ class Evidence:
     def causes(self, profiles: bool = False) -> list[Cause]:
         """List the effects in the order of what they explain, with their likelihood profiles if asked for."""
         of_outliers = [self._outlier_cause(outliers) for outliers in self.selection.baseline.outliers]
-        return of_outliers + [self._cause(term, without, profiles) for term, without in self._losses]
+        return of_outliers + [self._cause(term, share, profiles) for term, share in self._in_order]
 
     def runners_up(self) -> list[Rival]:
         """List the other effects of the last round that began without any."""
@@ -83,8 +94,9 @@ class Evidence:
             and not any(trial.terms[-1].replaces(term) for term in chosen.terms)
         ]
 
-    def _cause(self, term: Term, without: Trial, profiles: bool) -> Cause:
+    def _cause(self, term: Term, share: float, profiles: bool) -> Cause:
         baseline, chosen, effect = self.selection.baseline, self.selection.trial, term.effect
+        without = self.selection.without(term)
         ratio = chosen.train - without.train
         if effect.visible_in_readings:  # and confirmed by plain squares
             ratio = -0.5 * baseline.train.samples * math.log(chosen.estimate.squares / without.estimate.squares)
@@ -93,7 +105,7 @@ class Evidence:
         return Cause(
             effect.name, effect.title, effect.describe({value.name: value.value for value in values}),
             effect.reference, self._channel(term),
-            evidence=float((without.estimate.squares - chosen.estimate.squares) / baseline.squares),
+            evidence=float(share),
             gain=gained(without, chosen),
             log_likelihood_ratio=ratio,
             parameters=values,

@@ -53,7 +53,9 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
         theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
-    responses = np.moveaxis(simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))[..., 0], 0, 2)  # [E, T, f]
+    responses = np.moveaxis(
+        simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))[..., 0], 0, 2
+    )  # [E, T, f]
     jacobian = problem.jacobian(estimate.theta, estimate.local, plant.free)
     share = _predicted(estimate, records, responses, jacobian)
     mask = records.mask

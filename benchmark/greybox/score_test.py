@@ -29,7 +29,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
     listed = []
     for name in EFFECTS.names():
         effect = EFFECTS[name]()
-        if not effect.simulated or name in contained or (effect.time_power is not None and baseline.cut):
+        if not effect.simulated or name in contained or (effect.time_power is not None and not baseline.repeated):
             continue
         channels = {"input": plant.nu, "force": 1, "output": plant.ny}[effect.port]
         on_channels = [Term(effect, channel) for channel in range(channels)]

@@ -50,6 +50,12 @@ class Selection:
     rounds: tuple[Round, ...]
     compared: Compared
 
+    def only(self, terms: Sequence[Term]) -> Trial:
+        """Fit some of the chosen effects again without the others."""
+        if len(terms) == len(self.trial.terms):
+            return self.trial
+        return only(self.baseline, self.trial, terms, self.noise_order)
+
     def without(self, term: Term) -> Trial:
         """Fit the chosen model again with one term less."""
         return without(self.baseline, self.trial, term, self.noise_order)
@@ -153,7 +159,12 @@ class _Search:
 
 def without(baseline: Baseline, trial: Trial, term: Term, noise_order: int) -> Trial:
     """Fit a model again with one term less."""
-    plant = baseline.plant.having([other for other in trial.terms if other != term])
+    return only(baseline, trial, [other for other in trial.terms if other != term], noise_order)
+
+
+def only(baseline: Baseline, trial: Trial, terms: Sequence[Term], noise_order: int) -> Trial:
+    """Fit a model again with some of its terms."""
+    plant = baseline.plant.having(terms)
     start = plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)
     return assess(baseline, baseline.fit(plant.terms, [start]), noise_order)
 

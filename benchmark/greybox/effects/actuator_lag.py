@@ -69,6 +69,10 @@ class ActuatorLag(InputEffect):
         """Start from one sample to a good part of the record."""
         return [Start((n * scales.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the kind of output says of which order the plant is; elsewhere one pole more is just order."""
+        return scales.kind in ("position", "velocity")
+
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Delay u by a first-order lag of p[0] seconds."""

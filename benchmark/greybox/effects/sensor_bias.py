@@ -38,6 +38,10 @@ class SensorBias(OutputEffect):
         """Start from a small bias; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms,), amplitude=0)]
 
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the reading has a zero of its own; that of any other quantity is its operating point."""
+        return scales.kind != "other"
+
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return y + p[0]."""

@@ -1,0 +1,70 @@
+"""Why nothing can be named on some records: they show the controller, or no model of the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.greybox.selection import Selection
+from simgap.records import Channels, Experiment
+
+# Share of the changes of one signal that repeat those of the other in the same sample.
+TOGETHER = 0.5
+ALIKE = 0.98
+FEW = 100  # samples
+CERTAIN = 2.0  # standard errors of a correlation
+
+
+def shows_controller(experiments: Sequence[Experiment], channels: Channels) -> str | None:
+    """Tell in a sentence that an output leads an input: then a good model may be the inverse of the controller.
+
+        r(l) = correlation of u(k) - u(k - 1) with y(k + l) - y(k + l - 1)
+
+    An input that is held between samples cannot move the output within the same sample; a controller reads the one and
+    sets the other there. So r(0)^2 is large, and r(-1) is larger than r(1) (Box, Jenkins and Reinsel 1994, ch. 11).
+    """
+    for i, u in enumerate(channels.inputs):
+        for j, y in enumerate(channels.outputs):
+            changes = [(np.diff(x.u[:, i]), np.diff(x.y[:, j])) for x in experiments if len(x) > 3]
+            earlier, same, later = (_correlation(changes, lag) for lag in (-1, 0, 1))
+            samples = sum(len(of_u) for of_u, _ in changes)
+            leads = abs(earlier) - abs(later) > CERTAIN / np.sqrt(max(samples, 1))
+            if same**2 > (TOGETHER if leads else ALIKE):
+                return (
+                    f"{u.name} answers {y.name} in the same sample (their changes correlate {same:.2f}): the record "
+                    f"shows the controller, and a model of it need not be the plant. Move {u.name} by hand or add a "
+                    "test signal to it, and record again."
+                )
+    return None
+
+
+def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
+    """Tell in a sentence that the mean of a held-out record is a better model of it than the best plant, and why."""
+    baseline, trial = selection.baseline, selection.trial
+    if float(trial.blocks.sum()) < baseline.squares_of_mean:
+        return None
+    records, plant = baseline.train, trial.estimate.plant
+    means = np.array([y[known, 0].mean() for y, known in zip(records.y, records.mask, strict=True)])
+    within = np.sqrt(np.mean([y[known, 0].var() for y, known in zip(records.y, records.mask, strict=True)]))
+    poles = -np.linalg.eigvals(plant.matrix(trial.estimate.theta)).real if plant.order else np.ones(1)
+    name = channels.outputs[baseline.outputs[0]].name
+    if len(means) > 1 and np.std(means) > within:
+        why = f"{name} works at another operating point in each record. Record around one of them"
+    elif poles.min() * records.duration < 1:
+        why = f"{name} integrates, so that the smallest offset grows. Record shorter runs, each from a known level"
+    elif baseline.valid.samples < FEW:
+        why = f"the held-out data have {baseline.valid.samples} samples. Record more"
+    else:
+        why = f"the inputs do not move {name} enough. Move them more, and faster"
+    return f"No model simulates held-out {name} better than its mean, so nothing is named: {why}."
+
+
+def _correlation(changes: Sequence[tuple[np.ndarray, np.ndarray]], lag: int) -> float:
+    pairs = [
+        np.stack((u[max(0, -lag) : len(u) - max(0, lag)], y[max(0, lag) : len(y) - max(0, -lag)])) for u, y in changes
+    ]
+    joined: Float[np.ndarray, "2 N"] = np.concatenate(pairs or [np.zeros((2, 0))], axis=1)
+    sizes = np.sqrt(np.mean(joined**2, axis=1)) if joined.shape[1] else np.zeros(2)
+    return float(np.mean(joined[0] / sizes[0] * (joined[1] / sizes[1]))) if sizes.all() else 0.0
