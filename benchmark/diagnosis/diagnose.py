@@ -98,9 +98,9 @@ def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
 
 
 def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
-    """List the named effects of all plants in the order of what they explain."""
-    causes = [cause for plant in evidence for cause in plant.causes(profiles)]
-    return tuple(sorted(causes, key=lambda cause: -cause.evidence))
+    """List the named effects of all plants, those of the plant that they explain best first."""
+    plants = sorted(evidence, key=lambda plant: -plant.explained)
+    return tuple(cause for plant in plants for cause in plant.causes(profiles))
 
 
 def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:
