@@ -98,11 +98,11 @@ def pruned(search, trial):
     return _Search(search).backward(trial).names
 
 
-def most_missed(search, trial):
-    """The effects of a trial in the order of what is lost without them."""
+def in_order(search, trial):
+    """The effects of a trial in the order of a diagnosis."""
     fitted = FittedPlant(trial.estimate, search.noise, search.outputs, search.train, ())
     evidence = Evidence(Identified(Selection(search, trial, 0, (), {}), fitted), channels("position"))
-    return [t.effect.name for t, _ in evidence._losses]
+    return [t.effect.name for t, _ in evidence._in_order]
 
 
 # ------------------------------------------------------------------ trials
@@ -166,7 +166,7 @@ def order_chosen(blocks_of):
     def fitted(plant, *_):
         return Estimate(plant, np.zeros(plant.size), np.zeros((1, 1)), np.zeros((1, 40, 1)), 1.0, True)
 
-    def errors(fit, _):
+    def errors(fit, *_):
         return np.asarray(blocks_of[fit.plant.order], dtype=float)
 
     with patch.object(linear, "fit_plain", fitted), patch.object(linear, "block_errors", errors):

@@ -37,7 +37,7 @@ def test_a_signal_of_no_known_kind_gets_the_order_of_the_plant_behind_it(plant, 
 
 def test_models_come_from_the_simplest_on_and_end_with_the_chosen_one():
     orders = orders_tried(*measured(third_order()), "other")
-    assert orders[0] == 1 and orders == sorted(orders)
+    assert orders[0] == 0 and orders == sorted(orders)
 
 
 def blocks(mean, swing=0.0):
@@ -48,14 +48,14 @@ def blocks(mean, swing=0.0):
 @pytest.mark.parametrize(("swing", "order"), [(0.9, 2), (0.85, 3)])
 def test_the_simplest_within_one_standard_error_of_the_best_is_chosen(swing, order):
     # Order 2 is worse than order 3 by 0.2 in the mean; its standard error is swing / sqrt(20), 0.2 at a swing of 0.894.
-    held_out = {1: blocks(9.0), 2: blocks(2.2, swing), 3: blocks(2.0), 4: blocks(2.0)}
+    held_out = {0: blocks(9.0), 1: blocks(9.0), 2: blocks(2.2, swing), 3: blocks(2.0), 4: blocks(2.0)}
     assert order_chosen(held_out) == order
 
 
 def test_one_order_in_vain_is_followed_by_another_try_and_two_are_not():
-    resonance = {1: blocks(5.0), 2: blocks(4.99), 3: blocks(1.0), 4: blocks(1.0)}  # a resonance takes two orders
+    resonance = {0: blocks(9.0), 1: blocks(5.0), 2: blocks(4.99), 3: blocks(1.0), 4: blocks(1.0)}  # a resonance takes two orders
     assert order_chosen(resonance) == 3
-    far = {1: blocks(5.0), 2: blocks(4.99), 3: blocks(4.98), 4: blocks(1.0)}
+    far = {0: blocks(9.0), 1: blocks(5.0), 2: blocks(4.99), 3: blocks(4.98), 4: blocks(1.0)}
     assert order_chosen(far) == 3  # of what was tried the best; 4 was not
 
 

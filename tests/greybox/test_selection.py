@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from .building import most_missed, plain_search, pruned, sizes_of, with_effects
+from .building import in_order, plain_search, pruned, sizes_of, with_effects
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -28,9 +28,9 @@ def test_effects_that_are_there_stay(search):
     assert set(pruned(search, with_effects(search, "constant_load", "dead_zone"))) == {"constant_load", "dead_zone"}
 
 
-def test_the_effect_that_is_missed_most_comes_first(search):
+def test_the_effect_that_takes_most_of_the_held_out_error_comes_first(search):
     found = with_effects(search, "dead_zone", "constant_load")
-    assert most_missed(search, found) == ["constant_load", "dead_zone"]
+    assert in_order(search, found) == ["constant_load", "dead_zone"]
 
 
 def test_the_fitted_effects_have_their_true_sizes(search):

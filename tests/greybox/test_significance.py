@@ -102,17 +102,24 @@ def test_a_trial_is_scored_by_schwarz_with_own_numbers_at_the_price_of_one_recor
 
 
 def test_of_trials_that_fit_alike_the_simplest_comes_first(search):
-    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6)
-    simple = trial(search, squares=0.502, log_likelihood=90.0, parameters=3)
-    other = trial(search, squares=0.51, log_likelihood=80.0, parameters=2)  # simpler still, but it fits worse
+    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6, held_out=BETTER)
+    simple = trial(search, squares=0.502, log_likelihood=90.0, parameters=3, held_out=np.ones(20))
+    other = trial(search, squares=0.51, log_likelihood=80.0, parameters=2, held_out=np.ones(20))  # it fits worse
     assert ranked(search, [other, simple, best]) == [simple, best, other]
 
 
-def test_without_one_that_fits_alike_the_best_score_comes_first(search):
-    worse = trial(search, squares=0.6, log_likelihood=40.0, parameters=2)
-    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6)
-    assert ranked(search, [worse, best]) == [best, worse]
+@pytest.mark.parametrize(("swing", "expected"), [(0.9, True), (0.85, False)])
+def test_a_simpler_trial_within_one_standard_error_in_held_out_data_comes_first(search, swing, expected):
+    # It is worse by 0.2 in the mean; the standard error is swing / sqrt(20), 0.2 at a swing of 0.894.
+    best = trial(search, squares=0.5, log_likelihood=100.0, parameters=6, held_out=np.ones(20))
+    simple = trial(search, squares=0.6, log_likelihood=40.0, parameters=2, held_out=blocks(1.2, swing))
+    assert (ranked(search, [best, simple])[0] is simple) is expected
     assert ranked(search, []) == []
+
+
+def blocks(mean, swing):
+    """Squares of twenty held-out blocks."""
+    return mean + swing * np.array([1.0, -1.0] * 10)
 
 
 def test_a_load_that_is_there_is_found_and_believed():
