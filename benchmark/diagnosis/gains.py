@@ -17,6 +17,7 @@ from simgap.records import Dataset, Experiment
 
 # More blocks hardly narrow an interval; longer ones forgive a memory that was taken for too short (Schmeiser 1982).
 BLOCKS = 16
+FEW = 8  # experiments
 # In units of the output's spread: the error of a simulation that grows without bound, and one that is rounding.
 LARGEST_ERROR = 1e60
 GROWN = 1e30
@@ -61,10 +62,10 @@ def share_with_interval(
     The logarithm is linear in the losses through d (delta method), and d is summed over the m blocks i of all
     experiments (method of batch means, Schmeiser, Operations Research 30, 1982; Ibragimov and Muller, J. Business &
     Economic Statistics 28, 2010). Blocks are as long as leaves 16 of them, but at least twice the memory tau of d
-    within the experiments, or whole experiments; neighbours of mean length L still share part of their noise, which
-    1 - tau / 2 L pays for, exact where the autocorrelation decays exponentially. Student's t has sum(w)^2 / sum(w^2)
-    - 1 degrees of freedom with the blocks' shares w of the losses, because an error that sits in two of ten blocks is
-    seen twice and not ten times (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
+    within the experiments, or as `block_starts` says. Neighbours of mean length L still share part of their noise,
+    which 1 - tau / 2 L (1/2 at least) pays for, exact where the autocorrelation decays exponentially. Student's t has
+    sum(w)^2 / sum(w^2) - 1 degrees of freedom with the blocks' shares w of the losses, because an error that sits in
+    two of ten blocks is seen twice (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
     """
     relative = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
     d = relative[1] - relative[0]
@@ -88,14 +89,16 @@ def share_with_interval(
 def block_starts(lengths: Int[np.ndarray, " E"], shortest: float) -> Int[np.ndarray, " m"]:
     """Cut experiments into equal blocks of at least so many samples; one that is shorter stays whole.
 
-    A single experiment is cut in two at least.
+    Few experiments are cut in two at least, because the scatter of few blocks is hardly known.
     """
-    counts = np.minimum(np.maximum(lengths // shortest, 2 if len(lengths) == 1 else 1).astype(int), lengths)
+    counts = np.maximum(lengths // shortest, 2 if len(lengths) < FEW else 1).astype(int)
+    counts = np.minimum(counts, lengths)
     ends = np.cumsum(lengths)
-    return np.concatenate([
+    starts = [
         end - length + length * np.arange(count) // count
         for end, length, count in zip(ends, lengths, counts, strict=True)
-    ])  # fmt: skip
+    ]
+    return np.concatenate(starts)
 
 
 def _bounded(error: np.ndarray) -> np.ndarray:
