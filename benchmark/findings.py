@@ -11,7 +11,8 @@ from jaxtyping import Float
 
 from simgap.records import Kind
 
-Verdict = Literal["named", "nothing_found", "unexplained"]
+# suspected: effects that passed in training, but their gain on the test split may be chance.
+Verdict = Literal["named", "suspected", "nothing_found", "unexplained"]
 
 # What a simulation error is plotted against. An effect lists under these names the views that show it.
 ViewName = Literal[
@@ -110,7 +111,8 @@ class Cause:
     """A physical effect that the data ask for.
 
     evidence: share of the plain model's squared error, in training, that the effect explains with those before it;
-    gain: share of the squared error on held-out data that is lost again when the effect alone is taken out.
+    gain: share of the squared error on held-out data that is lost again when the effect alone is taken out;
+    deciding_experiment: what to record if the effect is only suspected.
     """
 
     effect: str
@@ -126,11 +128,12 @@ class Cause:
     confounded_with: tuple[Separation, ...] = ()
     shows_in: tuple[ViewName, ...] = ()
     profiles: tuple[Profile, ...] = ()
+    deciding_experiment: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One test experiment: measured, and simulated before and after the causes were added. t in s."""
+    """One test experiment: measured, and simulated before and after the causes, or suspects, were added. t in s."""
 
     experiment: str
     t: Float[np.ndarray, " N"]
@@ -142,7 +145,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Gain:
-    """Free-run RMSE on the test split per output; share is 1 - after/before over all outputs, with a 95 % interval."""
+    """Free-run RMSE on the test split per output; share is 1 - after/before over all outputs, with a 95 % interval.
+
+    After is the model with the causes or, where they are only suspected, with the suspects.
+    """
 
     before: dict[str, float]
     after: dict[str, float]
@@ -163,7 +169,7 @@ class Offer:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """The answer of `simgap.diagnose` about one data set."""
+    """The answer of `simgap.diagnose` about one data set; suspects stand in the place of causes, never beside them."""
 
     dataset: str
     verdict: Verdict
@@ -181,6 +187,12 @@ class Findings:
     offers: tuple[Offer, ...] = ()
     traces: tuple[Trace, ...] = ()
     seed: int = 0
+    suspects: tuple[Cause, ...] = ()
+
+    @property
+    def effects(self) -> tuple[Cause, ...]:
+        """Those of the model that `gain` and `traces` are of: the causes, or the suspects."""
+        return self.causes or self.suspects
 
     def to_json(self) -> dict[str, Any]:
         """Schema 1 of `simgap diagnose --json`; what is infinite or undefined is null: JSON has no such number."""
@@ -193,22 +205,8 @@ class Findings:
                 {"view": w.label, "output": w.output, "share": w.share, "chance": w.chance, "text": w.text}
                 for w in self.wrong
             ],
-            "causes": [
-                {
-                    "effect": c.effect,
-                    "title": c.title,
-                    "text": c.text,
-                    "channel": c.channel,
-                    "evidence": c.evidence,
-                    "gain": c.gain,
-                    "log_likelihood_ratio": c.log_likelihood_ratio,
-                    "parameters": [vars(p) for p in c.parameters],
-                    "per_experiment": c.per_experiment,
-                    "confounded_with": [s.effect for s in c.confounded_with],
-                    "separate_by": {s.effect: s.experiment for s in c.confounded_with},
-                }
-                for c in self.causes
-            ],
+            "causes": [_cause(cause) for cause in self.causes],
+            "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
             "gain": vars(self.gain),
             "checks": list(self.checks),
@@ -218,6 +216,22 @@ class Findings:
             "seconds": self.seconds,
         }
         return _only_numbers(answer)
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    return {
+        "effect": cause.effect,
+        "title": cause.title,
+        "text": cause.text,
+        "channel": cause.channel,
+        "evidence": cause.evidence,
+        "gain": cause.gain,
+        "log_likelihood_ratio": cause.log_likelihood_ratio,
+        "parameters": [vars(parameter) for parameter in cause.parameters],
+        "per_experiment": cause.per_experiment,
+        "confounded_with": [other.effect for other in cause.confounded_with],
+        "separate_by": {other.effect: other.experiment for other in cause.confounded_with},
+    }
 
 
 def _only_numbers(value: Any) -> Any:

@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 Row = Mapping[str, Any]
-NOTHING, UNEXPLAINED = "nothing found", "unexplained"
+NOTHING, UNEXPLAINED, SUSPECTED = "nothing found", "unexplained", "suspected"
 
 
 def first_answer(row: Row) -> str:
@@ -67,8 +67,8 @@ def picture(rows: Sequence[Row], file: Path) -> None:
 
     counts = matrix(rows)
     hidden = sorted(counts)
-    answers = sorted({name for counter in counts.values() for name in counter} - {NOTHING, UNEXPLAINED})
-    answers += [NOTHING, UNEXPLAINED]
+    answers = sorted({name for counter in counts.values() for name in counter} - {SUSPECTED, NOTHING, UNEXPLAINED})
+    answers += [SUSPECTED, NOTHING, UNEXPLAINED]
     figure = Figure(figsize=(4 + 0.42 * len(answers), 2.6 + 0.34 * len(hidden)), layout="constrained")
     axes = figure.add_subplot()
     shares = [[100 * counts[h][a] / counts[h].total() for a in answers] for h in hidden]

@@ -11,7 +11,10 @@ from simgap.greybox.model import GreyBoxModel
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found, as a text, a page or JSON; `model` simulates with the named causes (`greybox-auto`)."""
+    """What was found, as a text, a page or JSON; `model` is `greybox-auto`, which never saw the test split.
+
+    It simulates with the causes, and with the suspects too.
+    """
 
     findings: Findings
     seconds: float
@@ -22,13 +25,18 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """named, nothing_found or unexplained."""
+        """named, suspected, nothing_found or unexplained."""
         return self.findings.verdict
 
     @property
     def causes(self) -> tuple[Cause, ...]:
         """The named effects, in the order of what they explain."""
         return self.findings.causes
+
+    @property
+    def suspects(self) -> tuple[Cause, ...]:
+        """The effects that passed in training, while their gain on the test split may be chance."""
+        return self.findings.suspects
 
     def to_json(self) -> dict[str, Any]:
         """Schema 1 of `simgap diagnose --json`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -102,6 +103,7 @@ class Evidence:
             ratio = -0.5 * baseline.train.samples * math.log(chosen.estimate.squares / without.estimate.squares)
         values = self._values(term)
         rivals = [rival for rival in self._rivals(term, without) if rival.behind < CONFOUNDED]
+        confounded = tuple(separation(effect, rival.effect, baseline.plant.kind) for rival in rivals)
         return Cause(
             effect.name, effect.title, effect.describe({value.name: value.value for value in values}),
             effect.reference, self._channel(term),
@@ -110,9 +112,10 @@ class Evidence:
             log_likelihood_ratio=ratio,
             parameters=values,
             per_experiment=effect.per_experiment,
-            confounded_with=tuple(separation(effect, rival.effect, baseline.plant.kind) for rival in rivals),
+            confounded_with=confounded,
             shows_in=effect.shows_in,
             profiles=self._profiles(term) if profiles else (),
+            deciding_experiment=deciding_experiment(effect, confounded, baseline.plant.kind),
         )  # fmt: skip
 
     def _outlier_cause(self, outliers: Outliers) -> Cause:
@@ -130,6 +133,7 @@ class Evidence:
             effect.reference, self._channel(term),
             evidence=outliers.share, gain=outliers.share, log_likelihood_ratio=outliers.log_likelihood_ratio,
             parameters=values, per_experiment=effect.per_experiment, shows_in=effect.shows_in,
+            deciding_experiment=deciding_experiment(effect, (), baseline.plant.kind),
         )  # fmt: skip
 
     def _values(self, term: Term) -> tuple[Value, ...]:
@@ -236,6 +240,16 @@ def separation(effect: Effect, other: Effect, kind: Kind) -> Separation:
             of_sensor = effect if effect.port == "output" else other
             experiment = f"add a second sensor: only {of_sensor.title} makes the two readings differ"
     return Separation(other.name, other.title, experiment)
+
+
+def deciding_experiment(effect: Effect, confounded: Sequence[Separation], kind: Kind) -> str:
+    """Describe the experiment that would show whether an effect is there that test data leave open."""
+    if confounded:
+        return "; ".join(other.experiment.rstrip(".") for other in confounded)
+    return (
+        "record more and longer test experiments, with inputs that bring out an error which "
+        f"{ERROR_THAT[most_telling(effect, kind)]}"
+    )
 
 
 def most_telling(effect: Effect, kind: Kind) -> ViewName:

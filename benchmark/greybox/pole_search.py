@@ -44,10 +44,12 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
     gains[plant.layout.gains] = gains[plant.layout.offset] = True
     tried = []
     few = plant.order <= 2
+    low, high = plant.low[plant.layout.poles], plant.high[plant.layout.poles]
     shapes = list(denominator_grid(plant, records, coarse=True)) if few else [
         [a * scale for a in starts[0][plant.layout.poles]] for scale in (0.25, 0.5, 1.0, 2.0)
     ]  # fmt: skip
-    for shape in shapes:
+    # Where an effect stands in the place of the spring, many sections of the grid are one.
+    for shape in np.unique(np.clip(shapes, low, high), axis=0):
         for start in starts:
             theta = start.copy()
             theta[plant.layout.poles] = shape

@@ -12,7 +12,7 @@ import numba
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.noise import schwarz_order
+from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, jacobian_of
 from simgap.greybox.trial import Trial, assess, holds_out, promises, ranked, significant
@@ -92,7 +92,7 @@ class _Search:
                 continue
             estimate = extend(self.baseline, trial.estimate, term)
             larger = self._assess(estimate) if estimate is not None else trial
-            if larger.train - trial.train > CONFIRMED and holds_out(self.baseline, trial, larger):
+            if passes(self.baseline, term, trial, larger):
                 trial = larger
         return trial
 
@@ -129,10 +129,10 @@ class _Search:
         return ranked([other for other in tried if significant(self.baseline, trial, other, together=2)])
 
     def backward(self, trial: Trial) -> Trial:
-        """Take out, one by one, the effects that the others have made superfluous."""
-        while len(trial.terms) > 1:
-            smaller = [self._without(trial, term) for term in trial.terms if not term.effect.visible_in_readings]
-            enough = [other for other in smaller if not significant(self.baseline, other, trial)]
+        """Take out, one by one, the effects that no longer pass alone against the rest; those that stay do."""
+        while trial.terms:
+            smaller = [(term, self._without(trial, term)) for term in trial.terms]
+            enough = [other for term, other in smaller if not passes(self.baseline, term, other, trial)]
             if not enough:
                 break
             trial = max(enough, key=lambda other: other.score)
@@ -157,16 +157,30 @@ class _Search:
         return without(self.baseline, trial, term, self.noise_order)
 
 
+def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether the larger model needs the effect that the smaller one does without.
+
+    What the readings show already must only be confirmed, by errors without memory.
+    """
+    if not term.effect.visible_in_readings:
+        return significant(baseline, smaller, larger)
+    train = baseline.train
+    without, within = (log_likelihood(t.estimate.errors, train.mask, 0, train.resolution) for t in (smaller, larger))
+    return within - without > CONFIRMED and holds_out(baseline, smaller, larger)
+
+
 def without(baseline: Baseline, trial: Trial, term: Term, noise_order: int) -> Trial:
     """Fit a model again with one term less."""
     return only(baseline, trial, [other for other in trial.terms if other != term], noise_order)
 
 
 def only(baseline: Baseline, trial: Trial, terms: Sequence[Term], noise_order: int) -> Trial:
-    """Fit a model again with some of its terms."""
+    """Fit a model again with some of its terms; one without any is no worse than the plain one."""
     plant = baseline.plant.having(terms)
-    start = plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)
-    return assess(baseline, baseline.fit(plant.terms, [start]), noise_order)
+    starts = [plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)]
+    if not plant.terms:
+        starts.append((baseline.estimate.theta, baseline.estimate.local))
+    return assess(baseline, baseline.fit(plant.terms, starts), noise_order)
 
 
 def compare(

@@ -51,7 +51,7 @@ def trace_figure(trace: Trace, findings: Findings, curves: int) -> go.Figure:
     )
     points = min(POINTS, ALL_POINTS // max(curves, 1))
     simulated = [("before", trace.before, BEFORE, 1.3)]
-    if findings.verdict == "named":
+    if findings.effects:
         simulated.append(("after", trace.after, AFTER, 1.5))
     for i, (name, unit) in enumerate(outputs):
         drawn = [("measured", trace.y, MEASURED, 2.4), *simulated]
@@ -70,7 +70,7 @@ def trace_figure(trace: Trace, findings: Findings, curves: int) -> go.Figure:
 
 def curves_of(findings: Findings) -> int:
     """Count the curves of one experiment."""
-    return len(findings.units) * (3 if findings.verdict == "named" else 2) + len(findings.inputs)
+    return len(findings.units) * (3 if findings.effects else 2) + len(findings.inputs)
 
 
 def view_figure(view: Wrong, unit: str) -> go.Figure | None:

@@ -37,7 +37,7 @@ class _Plots:
 
 
 def diagnosis_page(findings: Findings) -> str:
-    """Write the whole answer: headline, gain, experiments, causes, everything else that the simulation gets wrong.
+    """Write the whole answer: headline, gain, experiments, causes or suspects, what else the simulation gets wrong.
 
     Whatever comes from a data set is text there: it is escaped, in plots too, and the page may load nothing.
     """
@@ -56,7 +56,7 @@ def diagnosis_page(findings: Findings) -> str:
         "wording": wording,
         "words": words,
         "traces": _traces(findings, plots),
-        "causes": [_cause(cause, findings, plots, shown) for cause in findings.causes],
+        "causes": [_cause(cause, findings, plots, shown) for cause in findings.effects],
     }
     rest = [view for view in words.beyond_chance(findings) if id(view) not in shown]
     content["views"] = [(view, _view(view, findings, plots)) for view in rest]
@@ -69,7 +69,7 @@ def _finalize(value: Any) -> Any:
 
 
 def _traces(findings: Findings, plots: _Plots) -> list[dict[str, Any]]:
-    picked = choose(findings.traces, findings.verdict == "named")
+    picked = choose(findings.traces, bool(findings.effects))
     curves = len(picked) * figures.curves_of(findings)
     return [
         {"name": trace.experiment, "why": why, "plot": plots.draw(figures.trace_figure(trace, findings, curves))}

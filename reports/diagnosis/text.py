@@ -23,18 +23,21 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         *_section("Plain linear model", _baseline(findings), width),
         *_section("What it gets wrong", _wrong(findings), width),
     ]
-    for i, cause in enumerate(findings.causes, start=1):
-        paragraphs += _section(f"Cause {i}: {words.cause_title(cause, findings)}", _cause(cause), width)
+    called = "Suspect" if findings.verdict == "suspected" else "Cause"
+    for i, cause in enumerate(findings.effects, start=1):
+        title = f"{called} {i}: {words.cause_title(cause, findings)}"
+        paragraphs += _section(title, _cause(cause, findings), width)
     if second := words.runner_up(findings):
         paragraphs += _section("Runner-up", [second], width)
-    if findings.causes:
-        paragraphs += _section("Free-run RMSE on the test experiments", _gain(findings), width)
+    if findings.effects:
+        title = "Free-run RMSE on the test experiments" + (", with the suspects" if findings.suspects else "")
+        paragraphs += _section(title, _gain(findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
         share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
-    if findings.causes:
+    if findings.effects:
         paragraphs += ["", *_wrapped("Ranges in brackets are 95 % intervals where nothing else is said.", width)]
     return "\n".join(paragraphs) + "\n"
 
@@ -65,13 +68,15 @@ def _wrong(findings: Findings) -> list[str]:
     return [view.text for view in shown] or ["No view of its error shows more than chance does."]
 
 
-def _cause(cause: Cause) -> Iterator[str]:
+def _cause(cause: Cause, findings: Findings) -> Iterator[str]:
     yield cause.text
     for parameter in cause.parameters:
         yield f"{parameter.name} = {numbers.estimate(parameter)} ({numbers.interval(parameter)})"
     yield words.evidence(cause)
     for other in cause.confounded_with:
         yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."
+    if decide := words.deciding(cause, findings):
+        yield decide
 
 
 def _gain(findings: Findings) -> Iterator[str]:

@@ -9,6 +9,7 @@ from simgap.findings import Cause, Findings, Wrong
 from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
+WIDE = 1000.0  # %: no interval that says anything
 LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
 
 
@@ -25,13 +26,21 @@ def headline(findings: Findings) -> str:
             "Something is there, but nothing in the catalogue explains it: "
             f"{percent(findings.left)} of the squared error could still be predicted from the input."
         )
-    names = [cause_title(cause, findings) for cause in findings.causes]
+    names = [cause_title(cause, findings) for cause in findings.effects]
     listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-    them, size = "it" if len(names) == 1 else "them", abs(gain.share)
-    start = f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments"
-    if not math.isfinite(gain.share):
-        return f"{start} cannot be compared, because a simulation diverges."
-    return f"{start} {'falls' if gain.share >= 0 else 'rises'} by {percent(size)}{_range(findings)}."
+    them = "it" if len(names) == 1 else "them"
+    if math.isfinite(gain.share):
+        change = f"{'falls' if gain.share >= 0 else 'rises'} by {percent(abs(gain.share))}{_range(findings)}"
+    else:
+        change = "cannot be compared, because a simulation diverges"
+    if findings.verdict == "suspected":
+        helps = "it helps" if len(names) == 1 else "they help"
+        says = f"speak against {them}" if gain.high < 0 else f"do not show that {helps}"
+        return (
+            f"Suspected, not shown: {listed}. The training data ask for {them}, but the test experiments {says}: "
+            f"with {them} the free-run error {change}."
+        )
+    return f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments {change}."
 
 
 def cause_title(cause: Cause, findings: Findings) -> str:
@@ -56,6 +65,18 @@ def evidence(cause: Cause) -> str:
         f"It explains {percent(cause.evidence)} of the plain model's squared error in training (log-likelihood ratio "
         f"{number(cause.log_likelihood_ratio)}); {held_out}.{remark}"
     )
+
+
+def deciding(cause: Cause, findings: Findings) -> str:
+    """Say what to record to decide about a suspect; empty for a cause, and where its confounders say it already."""
+    if findings.verdict != "suspected" or cause.confounded_with or not cause.deciding_experiment:
+        return ""
+    return f"To decide: {cause.deciding_experiment.rstrip('.')}."
+
+
+def with_effects(findings: Findings) -> str:
+    """Name the model that the gain is of: with the causes, or with the suspects."""
+    return "with the suspects" if findings.verdict == "suspected" else "with the causes"
 
 
 def runner_up(findings: Findings) -> str:
@@ -100,5 +121,7 @@ def _range(findings: Findings) -> str:
     low, high = sorted(math.copysign(100, findings.gain.share) * end for end in (findings.gain.low, findings.gain.high))
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
+    if high - low > WIDE:
+        return ", in too few independent samples for an interval"
     places = 0 if high - low > 2 else 1
     return f" ({low:.{places}f} to {high:.{places}f} %)"

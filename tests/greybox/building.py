@@ -14,12 +14,12 @@ from simgap.greybox import linear
 from simgap.greybox import samples as _samples
 from simgap.greybox.evidence import Evidence, intervals
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.identification import Identified
+from simgap.greybox.identification import Identified, identify
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.samples import Records
 from simgap.greybox.score_test import add, jacobian_of, score
 from simgap.greybox.score_test import candidates as _candidates
-from simgap.greybox.selection import Selection, _Search, compare
+from simgap.greybox.selection import Selection, _Search, compare, passes
 from simgap.greybox.trial import Trial, assess
 from simgap.greybox.trial import ranked as _ranked
 from simgap.greybox.trial import significant as _significant
@@ -96,6 +96,17 @@ def sizes_of(trial):
 def pruned(search, trial):
     """What is left of a trial's effects without the superfluous ones."""
     return _Search(search).backward(trial).names
+
+
+def passing_alone(training):
+    """The effects that are selected; each must pass against the others in the last model."""
+    found = set()
+    for identified in identify(training):
+        selection = identified.selection
+        for missing in selection.trial.terms:
+            assert passes(selection.baseline, missing, selection.without(missing), selection.trial)
+        found |= set(selection.trial.names)
+    return found
 
 
 def in_order(search, trial):

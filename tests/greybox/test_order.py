@@ -53,7 +53,13 @@ def test_the_simplest_within_one_standard_error_of_the_best_is_chosen(swing, ord
 
 
 def test_one_order_in_vain_is_followed_by_another_try_and_two_are_not():
-    resonance = {0: blocks(9.0), 1: blocks(5.0), 2: blocks(4.99), 3: blocks(1.0), 4: blocks(1.0)}  # a resonance takes two orders
+    resonance = {
+        0: blocks(9.0),
+        1: blocks(5.0),
+        2: blocks(4.99),
+        3: blocks(1.0),
+        4: blocks(1.0),
+    }  # a resonance takes two orders
     assert order_chosen(resonance) == 3
     far = {0: blocks(9.0), 1: blocks(5.0), 2: blocks(4.99), 3: blocks(4.98), 4: blocks(1.0)}
     assert order_chosen(far) == 3  # of what was tried the best; 4 was not

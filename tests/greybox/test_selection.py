@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from .building import in_order, plain_search, pruned, sizes_of, with_effects
+from simgap.data.simulated.rigs import hide
+
+from .building import in_order, passing_alone, plain_search, pruned, sizes_of, with_effects
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -37,3 +39,35 @@ def test_the_fitted_effects_have_their_true_sizes(search):
     found = sizes_of(with_effects(search, "constant_load", "dead_zone"))
     assert found["constant_load"] == pytest.approx(0.3, rel=0.05)
     assert found["dead_zone"] == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["quadratic_drag", "sensor_lag"])
+def test_an_effect_that_stands_alone_must_pass_against_the_plain_model(name):
+    rng = np.random.default_rng(4)
+    u = steps(rng, (4, 120))
+    y = free_run(velocity(), u, 0.1)[0] + 0.02 * rng.standard_normal((4, 120, 1))
+    made = experiments(u, y, 0.1)
+    linear = plain_search(made[:3], made[3:], "velocity")
+    assert pruned(linear, with_effects(linear, name)) == ()
+
+
+def test_what_the_readings_seemed_to_show_must_pass_against_the_rest_too():
+    # Readings that never fall below zero look like those of a sensor without sign; the machine just does not go there.
+    rng = np.random.default_rng(5)
+    u = steps(rng, (4, 120), low=0.2)
+    y = np.abs(free_run(velocity(), u, 0.1)[0] + 0.02 * rng.standard_normal((4, 120, 1)))
+    made = experiments(u, y, 0.1)
+    one_sided = plain_search(made[:3], made[3:], "velocity")
+    assert pruned(one_sided, with_effects(one_sided, "absolute_sensor")) == ()
+
+
+@pytest.mark.parametrize(
+    ("rig", "effects"),
+    [
+        ("cart", {"coulomb_friction": 1.0, "dead_zone": 1.0}),
+        ("stage", {"absolute_sensor": 1.0, "cubic_stiffness": 1.0}),
+        ("slide", {"quadratic_drag": 1.0, "sensor_drift": 1.0}),
+    ],
+)
+def test_every_effect_of_the_answer_passes_alone_against_the_rest(rig, effects):
+    assert passing_alone(hide(rig, effects, noise=0.05, seed=3).training) >= set(effects)

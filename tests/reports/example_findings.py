@@ -61,6 +61,15 @@ def nothing_found(named) -> Findings:
 
 
 @pytest.fixture
+def suspected(named) -> Findings:
+    """The same cart, whose test experiments do not show whether the friction is there."""
+    decide = "record more and longer test experiments, with inputs that bring out an error which depends on the speed"
+    suspects = (replace(named.causes[0], confounded_with=(), deciding_experiment=decide),)
+    gain = replace(named.gain, after={"x": 1.1}, share=0.113, low=-0.05, high=0.27)
+    return replace(named, verdict="suspected", causes=(), suspects=suspects, gain=gain)
+
+
+@pytest.fixture
 def unexplained(nothing_found) -> Findings:
     """The same cart with a force that no effect has."""
     offer = Offer("x", "force ~ +1 x^3 -0.2 v", 0.44, "relative")

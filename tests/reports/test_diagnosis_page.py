@@ -16,8 +16,8 @@ from simgap.reports.diagnosis.page import diagnosis_page
 from simgap.reports.diagnosis.traces import axis_range, choose, thin
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
-named, nothing_found, unexplained, hostile = (
-    EXAMPLES[name] for name in ("named", "nothing_found", "unexplained", "hostile")
+named, suspected, nothing_found, unexplained, hostile = (
+    EXAMPLES[name] for name in ("named", "suspected", "nothing_found", "unexplained", "hostile")
 )
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}
@@ -85,13 +85,26 @@ def test_nothing_found_has_no_section_of_a_cause(nothing_found):
     assert len(page.plots) == 3 + 2
 
 
+def test_a_suspect_is_called_a_suspect_and_its_simulation_is_shown(suspected):
+    page = Page(diagnosis_page(suspected))
+    for told in (
+        "Suspected, not shown: Coulomb friction. The training data ask for it", "Suspect 1 of 1", "with the suspects",
+        "1.1 mm", "-11 %", "To decide: record more and longer test experiments",
+    ):  # fmt: skip
+        assert told in page.text
+    assert "with the causes" not in page.text
+    assert "Cause 1" not in page.text
+    assert len(page.plots) == 3 + 1 + 2
+    assert all('"name":"after"' in plot for plot in page.plots[:3])
+
+
 def test_an_offer_is_called_an_offer(unexplained):
     text = Page(diagnosis_page(unexplained)).text
     assert "nothing in the catalogue explains it: 27 %" in text
     assert text.index("An offer to look at, not a finding") < text.index("force ~ +1 x^3 -0.2 v")
 
 
-@pytest.mark.parametrize("example", ["named", "nothing_found", "unexplained", "hostile"])
+@pytest.mark.parametrize("example", ["named", "suspected", "nothing_found", "unexplained", "hostile"])
 def test_nothing_is_loaded_from_anywhere(example, request):
     page = Page(diagnosis_page(request.getfixturevalue(example)))
     assert not [(tag, name) for tag, attrs in page.tags for name in attrs if name in LOADS]

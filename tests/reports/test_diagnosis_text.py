@@ -10,8 +10,8 @@ from simgap.reports.diagnosis.numbers import interval, numbers
 from simgap.reports.diagnosis.text import diagnosis_text
 
 EXAMPLES = runpy.run_path(str(Path(__file__).with_name("example_findings.py")))
-named, nothing_found, unexplained, hostile = (
-    EXAMPLES[name] for name in ("named", "nothing_found", "unexplained", "hostile")
+named, suspected, nothing_found, unexplained, hostile = (
+    EXAMPLES[name] for name in ("named", "suspected", "nothing_found", "unexplained", "hostile")
 )
 
 CART = """\
@@ -61,6 +61,47 @@ def test_nothing_found_names_no_cause_and_no_gain(nothing_found):
     assert "cart: Nothing found:" in text
     assert "Cause 1" not in text
     assert "->" not in text
+
+
+def test_a_suspect_is_called_a_suspect_with_its_gain_and_what_would_decide(suspected):
+    text = in_one_line(diagnosis_text(suspected))
+    assert text.startswith(
+        "cart: Suspected, not shown: Coulomb friction. The training data ask for it, but the test experiments do not "
+        "show that it helps: with it the free-run error falls by 11 % (-5 to 27 %). Plain linear model"
+    )
+    assert "Suspect 1: Coulomb friction" in text
+    assert "To decide: record more and longer test experiments, with inputs that bring out an error which" in text
+    assert "Free-run RMSE on the test experiments, with the suspects x: 1.24 -> 1.1 mm (-11 %)" in text
+    assert "Cause 1" not in text
+    assert "errs because" not in text
+
+
+def test_of_a_named_cause_nothing_is_left_to_decide(named):
+    cause = replace(named.causes[0], confounded_with=(), deciding_experiment="record more")
+    assert "To decide" not in diagnosis_text(replace(named, causes=(cause,)))
+
+
+def test_a_confounded_suspect_says_its_experiment_once(suspected, named):
+    confounded = named.causes[0].confounded_with
+    suspect = replace(suspected.suspects[0], confounded_with=confounded, deciding_experiment=confounded[0].experiment)
+    text = in_one_line(diagnosis_text(replace(suspected, suspects=(suspect,))))
+    assert text.count("stop and start again in the same direction") == 1
+
+
+def test_test_experiments_that_speak_against_suspects_are_said_to(suspected):
+    worse = replace(suspected.gain, share=-0.04, low=-0.07, high=-0.01)
+    both = (suspected.suspects[0], replace(suspected.suspects[0], title="backlash"))
+    assert (
+        "Coulomb friction and backlash. The training data ask for them, but the test experiments speak against them: "
+        "with them the free-run error rises by 4 % (1 to 7 %)."
+    ) in in_one_line(diagnosis_text(replace(suspected, gain=worse, suspects=both)))
+
+
+def test_an_interval_that_says_nothing_is_said_to_say_nothing(suspected):
+    wide = replace(suspected.gain, low=-40.0, high=0.99)
+    assert "falls by 11 %, in too few independent samples for an interval." in in_one_line(
+        diagnosis_text(replace(suspected, gain=wide))
+    )
 
 
 def test_an_offer_is_called_an_offer(unexplained):
