@@ -44,12 +44,10 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
     gains[plant.layout.gains] = gains[plant.layout.offset] = True
     tried = []
     few = plant.order <= 2
-    low, high = plant.low[plant.layout.poles], plant.high[plant.layout.poles]
     shapes = list(denominator_grid(plant, records, coarse=True)) if few else [
         [a * scale for a in starts[0][plant.layout.poles]] for scale in (0.25, 0.5, 1.0, 2.0)
     ]  # fmt: skip
-    # Where an effect stands in the place of the spring, many sections of the grid are one.
-    for shape in np.unique(np.clip(shapes, low, high), axis=0):
+    for shape in shapes:
         for start in starts:
             theta = start.copy()
             theta[plant.layout.poles] = shape
@@ -83,6 +81,8 @@ def denominator_grid(plant: Plant, records: Records, coarse: bool = False) -> It
         yield from (list(chosen) for chosen in choose(rates[::-1], plant.order))
     elif plant.order <= 1:
         yield from ([rate][: plant.order] for rate in rates[: 1 if plant.imposed else None])
+    elif plant.order == 2 and plant.high[1] == 0:  # an effect stands in the place of the spring
+        yield from ([rate, 0.0] for rate in rates)
     else:
         sections = [[2 * damping * w, w * w] for w in np.geomspace(2 / duration, 2.5 / dt, 9)
                     for damping in (0.05, 0.3, 1.0)]  # fmt: skip

@@ -175,12 +175,12 @@ def without(baseline: Baseline, trial: Trial, term: Term, noise_order: int) -> T
 
 
 def only(baseline: Baseline, trial: Trial, terms: Sequence[Term], noise_order: int) -> Trial:
-    """Fit a model again with some of its terms; one without any is no worse than the plain one."""
+    """Fit a model again with some of its terms, from its linear part and from the plain one."""
     plant = baseline.plant.having(terms)
-    starts = [plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)]
-    if not plant.terms:
-        starts.append((baseline.estimate.theta, baseline.estimate.local))
-    return assess(baseline, baseline.fit(plant.terms, starts), noise_order)
+    theta, local = plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)
+    plain, of_plain = plant.carry(baseline.plant, baseline.estimate.theta, baseline.estimate.local)
+    plain[plant.n_linear :] = theta[plant.n_linear :]
+    return assess(baseline, baseline.fit(plant.terms, [(theta, local), (plain, of_plain)]), noise_order)
 
 
 def compare(
