@@ -15,7 +15,7 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, jacobian_of
-from simgap.greybox.trial import Trial, assess, holds_out, promises, ranked, significant
+from simgap.greybox.trial import Trial, assess, holds_out, promises, ranked, significant, simulates_as_well
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -146,7 +146,7 @@ class _Search:
             rest = self._without(trial, term)
             trials = compare(self.baseline, rest.estimate, self.noise_order, self.compared)
             trials = ranked([other for other in trials if significant(self.baseline, rest, other)])
-            if trials and trials[0].score > trial.score + BETTER and ranked([trials[0], trial])[0] is trials[0]:
+            if trials and trials[0].score > trial.score + BETTER and not simulates_as_well(trial, trials[0]):
                 trial = self.backward(trials[0])
         return trial
 
