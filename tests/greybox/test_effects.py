@@ -6,6 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from simgap.data.simulated.rigs import CATALOGUE, hide, physical, suitable
 from simgap.error_views.views import views
@@ -127,7 +128,7 @@ def test_units_follow_from_what_the_output_measures(kind, unit, order, force, ra
 
 # What a rig calls the size of an effect is the first number of the effect, but for these.
 SIZE = {"gain_fade": lambda size, dataset: size / (300 * dataset.training.dt)}
-NO_SIZE = {"absolute_sensor", "sensor_drift", "sensor_bias"}
+NO_SIZE = {"absolute_sensor", "sensor_drift", "sensor_bias", "curved_sensor"}
 LAST = {"sensor_saturation", "load_friction"}
 
 
@@ -152,3 +153,32 @@ def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
     estimated = fitted.estimate.theta[plant.part_of(plant.terms[0])]
     size = SIZE.get(effect, lambda size, _: size)(physical(rig, {effect: 1.0})[effect], dataset)
     assert abs(estimated[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)
+
+
+@pytest.mark.parametrize("low", [-1.5, 0.3])
+@pytest.mark.parametrize("ends", [-1.0, -0.4, 0.0, 0.7, 1.0])
+@pytest.mark.parametrize("tilt", [-1.0, 0.0, 0.5, 1.0])
+def test_a_curved_characteristic_never_falls_has_a_mean_gain_of_1_and_leaves_zero_where_it_is(low, ends, tilt):
+    effect, sizes = EFFECTS["curved_input"](), scales(u_low=low, u_high=2.0)
+    middle, half = (parameter.low for parameter in effect.parameters(sizes)[2:])
+    p = np.array([ends, tilt, middle, half])
+    u = np.linspace(middle - 2 * half, middle + 2 * half, 401)[None]
+    arriving = effect.term(u, p, 0.1)[0]
+    assert np.all(np.diff(arriving) >= -1e-12)
+    assert arriving[300] - arriving[100] == pytest.approx(2 * half)  # over its range
+    if low < 0:
+        assert effect.term(np.zeros((1, 1)), p, 0.1) == pytest.approx(0.0)
+    assert effect.term(u, np.array([0.0, 0.0, middle, half]), 0.1) == pytest.approx(u)
+
+
+@pytest.mark.parametrize("ratio", [6.0, 1 / 6.0])
+def test_a_valve_of_equal_percentage_is_on_a_curve_of_two_numbers(ratio):
+    u = np.linspace(1.0, 3.0, 200)[None]
+    valve = (ratio ** ((u - 1) / 2) - 1) / (ratio - 1)  # over its stroke
+    sizes = scales(u_low=1.0, u_high=3.0)
+    middle, half = (parameter.low for parameter in EFFECTS["curved_input"]().parameters(sizes)[2:])
+    found = least_squares(
+        lambda p: (EFFECTS["curved_input"].term(u, np.array([*p, middle, half]), 0.1) - 1)[0] / 2 - valve[0],
+        [0.0, 0.0], bounds=(-1, 1),
+    )  # fmt: skip
+    assert np.max(np.abs(found.fun)) < 0.02

@@ -26,6 +26,7 @@ CATALOGUE = {
     "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0, 0.7),
     "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5),
     "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
+    "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
@@ -45,6 +46,7 @@ CATALOGUE = {
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
     "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
     "sensor_bias": Hidden("bias", "Y, standard deviation", 0.3, 2.0, 3.0, 0.9, 1.2),
+    "curved_sensor": Hidden("sensor_squared", "share that shows by its square", 0.8, 0.8, 0.8, 0.8, 0.8),
     "sensor_saturation": Hidden("sensor_limit", "Y, each way", 0.5, 4.0, 7.0, 11.0, 11.0),
     "sensor_lag": Hidden("sensor_lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
     "absolute_sensor": Hidden("absolute", "", 1.0, 1.0, 1.0, None, None),
@@ -53,7 +55,6 @@ CATALOGUE = {
 }
 OUTSIDE = {  # no diagnosis knows these by name
     "position_dependent_gain": Hidden("ripple", "share", None, 0.6, 0.6, None, None),
-    "squared_input": Hidden("squared", "share", 1.0, 1.0, 1.0, 1.0, 1.0),
     "negative_damping": Hidden("push", "1/s", None, 5.0, 2.0, None, None),
     "missing_input": Hidden("missing", "L/s^2, tanks L/s, standard deviation", 0.7, 40.0, 12.0, 0.1, 0.1),
 }
