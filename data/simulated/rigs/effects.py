@@ -28,6 +28,7 @@ CATALOGUE = {
     "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
     "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
+    "valve_stiction": Hidden("stick", "U, stick band", 2.0, 2.5, 2.5, 2.5, 2.5),
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),

@@ -27,6 +27,8 @@ class Drive(NamedTuple):
     dead_zone: float  # input units, each way
     limit: float  # input units, each way; infinite is off
     gap: float  # input units, whole gap of the backlash
+    stick: float  # input units, band in which a valve sticks that turns back
+    slip: float  # input units, jump with which it starts again
     lag: float  # s
 
 
@@ -87,12 +89,37 @@ RECORD = (floats(Drive), ROWS, ROWS, FLOAT, FLOAT, FLOAT, types.int64)
 
 
 @njit(cache=True)
+def sticking(drive, x, valve):
+    """Follow a valve to the next command x; it is known by its stem, the last x, its side, and where it stopped.
+
+    The side is that of the last motion, times 2 while it goes on. What stopped starts again the same way beyond the
+    slip jump, and the other way beyond the stick band; it then lags behind x by half of what lies between the two.
+    """
+    stem, before, side, stopped = valve
+    if abs(side) == 2.0 and (x - before) * side <= 0.0:
+        side, stopped = side / 2.0, before
+    if abs(side) != 2.0:
+        onwards, back, way = drive.slip, drive.stick, side
+        if side == 0.0:  # it has not moved yet, and stands in the middle of its band
+            onwards = back = (drive.stick + drive.slip) / 2
+            way = 1.0
+        if (x - stopped) * way > onwards:
+            side = 2.0 * way
+        elif (stopped - x) * way > back:
+            side = -2.0 * way
+    if abs(side) == 2.0:
+        stem = x - side / 2.0 * (drive.stick - drive.slip) / 2
+    return stem, x, side, stopped
+
+
+@njit(cache=True)
 def arriving(drive, u, dt, substeps):
     """Compute w [T substeps, 3] at the begin, middle and end of each substep, over which only the lag moves it."""
     steps, h = len(u) * substeps, dt / substeps
     shift = round(drive.delay / h)
     w = np.empty((steps, 3))
     last, lagged = 0.0, 0.0
+    valve = (0.0, 0.0, 0.0, 0.0)
     for step in range(steps):
         value = u[max((step - shift) // substeps, 0)]
         value += drive.squared * value * (abs(value) / drive.amplitude - 1.0)
@@ -101,6 +128,10 @@ def arriving(drive, u, dt, substeps):
         value = max(value - drive.dead_zone, 0.0) + min(value + drive.dead_zone, 0.0)
         value = min(max(value, -drive.limit), drive.limit)
         last = value = min(max(last, value - drive.gap / 2), value + drive.gap / 2)
+        if drive.stick > 0.0:
+            if step == 0 or (step - shift) % substeps == 0:
+                valve = sticking(drive, value, valve)
+            value = valve[0]
         if step == 0 or drive.lag == 0.0:
             lagged = value
         keep = exp(-h / 2 / drive.lag) if drive.lag > 0.0 else 0.0

@@ -12,13 +12,15 @@ from numpy.random import Generator
 from simgap.data.simulated.rigs.kernels import Body, Drive, Tanks, fill, move
 from simgap.data.simulated.rigs.plants import Rig
 
+SLIP = 0.6  # of a sticking valve: the jump as a share of the band
+
 
 def simulate_motion(
     rig: Rig, size: Mapping[str, float], u: np.ndarray, start_rng: Generator, missing_rng: Generator, substeps: int
 ) -> Float[np.ndarray, "n ny"]:
     """Integrate the true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
     other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
-    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf)}
+    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf), "slip": SLIP * size.get("stick", 0.0)}
     drive = Drive(**{field: known.get(field, size.get(field, 0.0)) for field in Drive._fields})
     offset, middle = rig.start * np.clip(start_rng.standard_normal(2), -2, 2), rig.middle
     first, second = (float(value) for value in offset + middle)
