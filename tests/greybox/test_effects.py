@@ -205,3 +205,13 @@ def test_how_finely_the_time_between_two_commands_is_divided_does_not_move_a_val
     u = np.random.default_rng(4).normal(size=(3, 200)).cumsum(axis=1)
     p, term = np.array([2.0, 0.6, 0.1]), EFFECTS["valve_stiction"].term
     assert term(np.repeat(u, 4, axis=1), p, 0.025)[:, ::4] == pytest.approx(term(u, p, 0.1))
+
+
+def test_an_actuator_of_limited_speed_is_late_by_what_it_could_not_do_and_no_more():
+    u = np.repeat([[0.0, 1.0, -1.0, -1.0, -1.0]], 8, axis=1)  # 0.8 s each
+    mean = EFFECTS["rate_limit"].term(u, np.array([2.0, 1.0]), 0.1)[0]
+    assert mean[:8] == pytest.approx(0.0)
+    assert mean[8:13] == pytest.approx([0.1, 0.3, 0.5, 0.7, 0.9])  # the middle of every step
+    assert mean[13:16] == pytest.approx(1.0)
+    assert mean[16:36] == pytest.approx(0.95 - 0.1 * np.arange(20))
+    assert mean[36:] == pytest.approx(-1.0)

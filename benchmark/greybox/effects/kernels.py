@@ -34,3 +34,23 @@ def stem(u, low, high, every):
                     at = last - side * low
             position[e, k : k + every] = shown
     return position
+
+
+@njit(cache=True, nogil=True)
+def limited_rate(u, up, down):
+    """Compute the mean over each step of what follows u [E, K] by no more than `up` and `down` per step."""
+    mean = np.empty_like(u)
+    for e in range(len(u)):
+        at = u[e, 0]
+        for k in range(u.shape[1]):
+            way = u[e, k] - at
+            speed = up if way > 0.0 else down
+            if abs(way) > speed:
+                moved = math.copysign(speed, way)
+                mean[e, k] = at + 0.5 * moved
+                at += moved
+            else:
+                # It arrives after the share |way| / speed of the step; so much of it is half a way short.
+                mean[e, k] = u[e, k] - (0.5 * way * abs(way) / speed if speed > 0.0 else 0.0)
+                at = u[e, k]
+    return mean

@@ -27,6 +27,7 @@ CATALOGUE = {
     "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5),
     "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
     "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0),
+    "rate_limit": Hidden("rate", "U/s upwards, half of it downwards", 3.5, 10.0, 4.0, 0.12, 0.06),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
     "valve_stiction": Hidden("stick", "U, stick band", 2.0, 2.5, 2.5, 2.5, 2.5),
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
@@ -69,7 +70,8 @@ def suitable(rig: str, outside: bool = False) -> tuple[str, ...]:
 def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
     """Turn the strength of each effect into its true size on a rig, in physical units (the tables' column `unit`).
 
-    Sizes grow with the strength s; a limit comes down from the full range as full / (1 + s (full / strong - 1)).
+    Sizes grow with the strength s, but a rate falls as strong / s, and a limit comes down from the full range as
+    full / (1 + s (full / strong - 1)).
     """
     if rig not in RIGS:
         raise ValueError(f"there is no rig {rig!r}; known are {', '.join(RIGS)}")
@@ -81,7 +83,9 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
             known = ", ".join((*suitable(rig), *suitable(rig, outside=True)))
             raise ValueError(f"{name!r} cannot be hidden in {rig!r}; what can be: {known}")
         sizes[name] = strength * strong
-        if row.field in {"limit", "sensor_limit", "rim"}:
+        if row.field == "rate":
+            sizes[name] = strong / strength if strength > 0 else inf
+        elif row.field in {"limit", "sensor_limit", "rim"}:
             full = RIGS[rig].largest_input if row.field == "limit" else RIGS[rig].reach
             sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":

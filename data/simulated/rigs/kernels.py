@@ -9,7 +9,7 @@ Dry friction holds a body at a velocity of exactly 0 for as long as the other fo
 
 from __future__ import annotations
 
-from math import exp, pi, sin, sqrt
+from math import exp, inf, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ class Drive(NamedTuple):
     asymmetry: float  # share: positive input counts 1 + a, negative 1 - a
     dead_zone: float  # input units, each way
     limit: float  # input units, each way; infinite is off
+    rate: float  # input units per s, upwards, and half of it downwards; infinite is off
     gap: float  # input units, whole gap of the backlash
     stick: float  # input units, band in which a valve sticks that turns back
     slip: float  # input units, jump with which it starts again
@@ -118,7 +119,7 @@ def arriving(drive, u, dt, substeps):
     steps, h = len(u) * substeps, dt / substeps
     shift = round(drive.delay / h)
     w = np.empty((steps, 3))
-    last, lagged = 0.0, 0.0
+    last, lagged, followed = 0.0, 0.0, 0.0
     valve = (0.0, 0.0, 0.0, 0.0)
     for step in range(steps):
         value = u[max((step - shift) // substeps, 0)]
@@ -127,6 +128,11 @@ def arriving(drive, u, dt, substeps):
         value *= 1.0 + drive.asymmetry if value > 0 else 1.0 - drive.asymmetry
         value = max(value - drive.dead_zone, 0.0) + min(value + drive.dead_zone, 0.0)
         value = min(max(value, -drive.limit), drive.limit)
+        if drive.rate < inf:
+            # The middle of the way that is taken within the substep.
+            end = min(max(value, followed - drive.rate / 2 * h), followed + drive.rate * h) if step else value
+            value = (end + (followed if step else value)) / 2
+            followed = end
         last = value = min(max(last, value - drive.gap / 2), value + drive.gap / 2)
         if drive.stick > 0.0:
             if step == 0 or (step - shift) % substeps == 0:

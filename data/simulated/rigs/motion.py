@@ -20,7 +20,8 @@ def simulate_motion(
 ) -> Float[np.ndarray, "n ny"]:
     """Integrate the true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
     other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
-    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf), "slip": SLIP * size.get("stick", 0.0)}
+    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf), "rate": size.get("rate", inf)}
+    known |= {"slip": SLIP * size.get("stick", 0.0)}
     drive = Drive(**{field: known.get(field, size.get(field, 0.0)) for field in Drive._fields})
     offset, middle = rig.start * np.clip(start_rng.standard_normal(2), -2, 2), rig.middle
     first, second = (float(value) for value in offset + middle)
