@@ -44,6 +44,7 @@ CATALOGUE = {
     "position_torque": Hidden("position_force", "L/s^2", None, 60.0, 12.0, None, None),
     "periodic_disturbance": Hidden("periodic", "L/s^2", 0.8, 50.0, 10.0, 0.06, 0.06),
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),
+    "hard_stop": Hidden("stop", "L, each way", None, 4.0, 7.0, None, None, 1.0),
     "sqrt_outflow": Hidden("root", "share", None, None, None, 1.0, 1.0),
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
     "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
@@ -85,7 +86,7 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
         sizes[name] = strength * strong
         if row.field == "rate":
             sizes[name] = strong / strength if strength > 0 else inf
-        elif row.field in {"limit", "sensor_limit", "rim"}:
+        elif row.field in {"limit", "sensor_limit", "rim", "stop"}:
             full = RIGS[rig].largest_input if row.field == "limit" else RIGS[rig].reach
             sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":

@@ -59,6 +59,7 @@ class Body(NamedTuple):
     hysteresis_width: float  # L that the body moves until then
     ripple: float  # share by which the gain changes over position
     ripple_period: float  # L
+    stop: float  # L from the centre, each way; infinite is off
     push: float  # 1/s, negative damping at the centre
     push_width: float  # L from the centre to where it turns into damping
 
@@ -226,6 +227,16 @@ def outside(other, step, substeps):
     return begin, begin + half, begin + 2 * half
 
 
+@njit(cache=True)
+def stopped(p, x, v):
+    """Keep the body between its stops; what runs into one loses its velocity."""
+    if x > p.stop:
+        return p.stop, min(v, 0.0)
+    if x < -p.stop:
+        return -p.stop, max(v, 0.0)
+    return x, v
+
+
 @njit(types.float64[:, ::1](floats(Body), *RECORD), cache=True)
 def move(p, drive, u, other, x, v, dt, substeps):
     """Integrate (x, v) [T substeps, 2] under the input u [T] and a force `other` [T + 1], straight between samples."""
@@ -233,9 +244,11 @@ def move(p, drive, u, other, x, v, dt, substeps):
     w = arriving(drive, u, dt, substeps)
     motion = np.empty((len(u) * substeps, 2))
     z = 0.0
+    x, v = stopped(p, x, v)
     for step in range(len(motion)):
         motion[step, 0], motion[step, 1] = x, v
         x, v, z = step_body(p, w[step], outside(other, step, substeps), step * h, h, x, v, z)
+        x, v = stopped(p, x, v)
     return motion
 
 

@@ -31,7 +31,7 @@ def simulate_motion(
         tanks = Tanks(**{field: known.get(field, size.get(field, 0.0)) for field in Tanks._fields})
         return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
     known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
-    known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7}
+    known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7, "stop": size.get("stop", inf)}
     body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
     motion = move(body, drive, u, other, first, second, rig.dt, substeps)
     return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]
