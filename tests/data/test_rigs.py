@@ -159,7 +159,8 @@ def test_a_body_never_goes_beyond_its_stop_and_what_rests_there_leaves_it_inward
 
 
 def test_a_sticking_valve_without_a_jump_is_backlash_and_one_with_a_jump_is_not():
-    drive = dict.fromkeys(Drive._fields, 0.0) | {"amplitude": 1.0, "limit": np.inf, "rate": np.inf}
+    unlimited = dict.fromkeys(("limit", "rate", "inner_limit"), np.inf)
+    drive = dict.fromkeys(Drive._fields, 0.0) | {"amplitude": 1.0} | unlimited
     u = np.random.default_rng(1).normal(size=200).cumsum()
     play = arriving(Drive(**drive | {"gap": 2.0}), u, 0.1, 4)
     assert arriving(Drive(**drive | {"stick": 2.0}), u, 0.1, 4) == pytest.approx(play)

@@ -32,6 +32,7 @@ CATALOGUE = {
     "valve_stiction": Hidden("stick", "U, stick band", 2.0, 2.5, 2.5, 2.5, 2.5),
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, 16.0, 40.0),
+    "inner_saturation": Hidden("inner_limit", "U, upwards, behind a lag", 0.8, 1.0, 1.0, 4.0, 4.0),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
     "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0),
@@ -86,8 +87,8 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
         sizes[name] = strength * strong
         if row.field == "rate":
             sizes[name] = strong / strength if strength > 0 else inf
-        elif row.field in {"limit", "sensor_limit", "rim", "stop"}:
-            full = RIGS[rig].largest_input if row.field == "limit" else RIGS[rig].reach
+        elif row.field in {"limit", "inner_limit", "sensor_limit", "rim", "stop"}:
+            full = RIGS[rig].largest_input if row.field in {"limit", "inner_limit"} else RIGS[rig].reach
             sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":
             sizes[name] = 1.0

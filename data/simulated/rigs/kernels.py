@@ -31,6 +31,7 @@ class Drive(NamedTuple):
     stick: float  # input units, band in which a valve sticks that turns back
     slip: float  # input units, jump with which it starts again
     lag: float  # s
+    inner_limit: float  # input units, upwards, behind the lag; infinite is off
 
 
 class Body(NamedTuple):
@@ -145,7 +146,7 @@ def arriving(drive, u, dt, substeps):
         w[step, 0] = lagged
         w[step, 1] = value + (lagged - value) * keep
         w[step, 2] = lagged = value + (lagged - value) * keep * keep
-    return w
+    return np.minimum(w, drive.inner_limit)
 
 
 @njit(cache=True)
