@@ -16,7 +16,7 @@ TERM = types.float64(
     types.float64[::1], types.int64, types.float64[::1], types.int64,
 )  # fmt: skip
 SLOTS = 5  # force terms that one model may have; the tuple has this length, so that the loop is compiled once
-FORCE, FRICTION, OUTFLOW, RIM = range(4)
+FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
 
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 
@@ -167,6 +167,12 @@ def run_plant(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registe
                                 if i + 1 < n:
                                     new[i + 1] += p[at + 2] * (new[i] - rim)
                                 new[i] = rim
+                    elif roles[q] == STOP:
+                        end = min(max(new[0], p[p_at[q]]), p[p_at[q] + 1])
+                        if new[0] != end:
+                            # The impact takes the velocity towards the stop and leaves one that is away from it.
+                            new[fast] = min(new[fast], 0.0) if new[0] > end else max(new[fast], 0.0)
+                            new[0] = end
                 for i in range(n):
                     z[i], before[i] = new[i], force[i]
                 step += 1

@@ -104,8 +104,7 @@ def extend(
 
 def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
     """Fit the model with one effect more, whatever the score test says of it; none where it has nowhere to begin."""
-    nothing = all(parameter.is_absent for parameter in baseline.plant.parameters_of(term))  # a grid of step 0
-    if nothing or not baseline.plant.starts_of(term):
+    if not baseline.plant.starts_of(term):
         return estimate
     extended = extend(baseline, estimate, term)
     if extended is not None:

@@ -14,7 +14,7 @@ from simgap.greybox.effects.effect import InputEffect, OutputEffect
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_plant_directly, transition
 from simgap.greybox.plant import Plant
 
-ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3}
+ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3, "stop": 4}
 
 
 @cache

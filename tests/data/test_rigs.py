@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from simgap.data.simulated.rigs import CATALOGUE, OUTSIDE, RIGS, hide, physical, suitable
+from simgap.data.simulated.rigs.kernels import Drive, arriving
 
 EVERY = [(rig, effect) for rig in RIGS for effect in (*suitable(rig), *suitable(rig, outside=True))]
 
@@ -147,6 +148,23 @@ def test_a_tank_that_overflows_never_stands_above_its_rim(rig):
         # upper of two tanks spills, however, is in the lower one sooner than what goes its proper way.
         assert rig == "tanks" or np.all(level <= clean(rig) + 1e-12)
         assert np.sum((level < clean(rig) - 0.1) & (level < rim)) > 20
+
+
+def test_a_body_never_goes_beyond_its_stop_and_what_rests_there_leaves_it_inwards():
+    end = physical("slide", {"hard_stop": 1.0})["hard_stop"]
+    x, v = clean("slide", "hard_stop").T
+    assert np.abs(x).max() == end
+    assert np.all(v[x == end] <= 0) and np.all(v[x == -end] >= 0)
+    assert np.sum(v[np.abs(x) == end] == 0) > 50
+
+
+def test_a_sticking_valve_without_a_jump_is_backlash_and_one_with_a_jump_is_not():
+    unlimited = dict.fromkeys(("limit", "rate", "inner_limit"), np.inf)
+    drive = dict.fromkeys(Drive._fields, 0.0) | {"amplitude": 1.0} | unlimited
+    u = np.random.default_rng(1).normal(size=200).cumsum()
+    play = arriving(Drive(**drive | {"gap": 2.0}), u, 0.1, 4)
+    assert arriving(Drive(**drive | {"stick": 2.0}), u, 0.1, 4) == pytest.approx(play)
+    assert np.std(arriving(Drive(**drive | {"stick": 2.0, "slip": 1.0}), u, 0.1, 4) - play) > 0.1
 
 
 def test_the_root_of_the_level_empties_a_tank_as_torricelli_says():

@@ -55,6 +55,10 @@ class Backlash(InputEffect):
         """Start from a narrow gap to a third of the input's range."""
         return [Start((share * (scales.u_high - scales.u_low),)) for share in (0.04, 0.12, 0.3)]
 
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the gap can be told from a dead zone: a force crosses it only where it changes its sign."""
+        return scales.kind not in ("position", "velocity") or scales.u_low < 0 < scales.u_high
+
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u behind a gap of width p[0]; before the record the input came from zero."""

@@ -14,8 +14,8 @@ from simgap.records import Kind
 
 Port = Literal["input", "force", "output"]
 # What the simulation does with the value of a force term: adds it to the forces; lets dry friction hold up to it; lets
-# so much flow out of a tank on top of its linear outflow; or lets the tank overflow above it.
-Role = Literal["force", "friction", "outflow", "rim"]
+# so much flow out of a tank on top of its linear outflow; lets the tank overflow above it; or stops a body there.
+Role = Literal["force", "friction", "outflow", "rim", "stop"]
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ class Quantisation(OutputEffect):
         return (Parameter("step", scales.y_unit, scales.quantisation_step, scales.quantisation_step, fixed=True),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from the grid of the readings."""
-        return [Start((scales.quantisation_step,))]
+        """Start from the grid of the readings, if they lie on one."""
+        return [Start((scales.quantisation_step,))] if scales.quantisation_step > 0 else []
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the readings lie on a grid."""

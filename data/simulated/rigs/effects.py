@@ -26,9 +26,13 @@ CATALOGUE = {
     "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0, 0.7),
     "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5),
     "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
+    "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0),
+    "rate_limit": Hidden("rate", "U/s upwards, half of it downwards", 3.5, 10.0, 4.0, 0.12, 0.06),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
+    "valve_stiction": Hidden("stick", "U, stick band", 2.0, 2.5, 2.5, 2.5, 2.5),
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, None, None),
+    "inner_saturation": Hidden("inner_limit", "U, upwards, behind a lag", 0.8, 1.0, 1.0, 4.0, 4.0),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
     "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0),
@@ -41,10 +45,12 @@ CATALOGUE = {
     "position_torque": Hidden("position_force", "L/s^2", None, 60.0, 12.0, None, None),
     "periodic_disturbance": Hidden("periodic", "L/s^2", 0.8, 50.0, 10.0, 0.06, 0.06),
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),
+    "hard_stop": Hidden("stop", "L, each way", None, 4.0, 7.0, None, None, 1.0),
     "sqrt_outflow": Hidden("root", "share", None, None, None, 1.0, 1.0),
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
     "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
     "sensor_bias": Hidden("bias", "Y, standard deviation", 0.3, 2.0, 3.0, 0.9, 1.2),
+    "curved_sensor": Hidden("sensor_squared", "share that shows by its square", 0.8, 0.8, 0.8, 0.8, 0.8),
     "sensor_saturation": Hidden("sensor_limit", "Y, each way", 0.5, 4.0, 7.0, 11.0, 11.0),
     "sensor_lag": Hidden("sensor_lag", "s", 0.5, 0.1, 0.4, None, None),
     "absolute_sensor": Hidden("absolute", "", 1.0, 1.0, 1.0, None, None),
@@ -53,7 +59,6 @@ CATALOGUE = {
 }
 OUTSIDE = {  # no diagnosis knows these by name
     "position_dependent_gain": Hidden("ripple", "share", None, 0.6, 0.6, None, None),
-    "squared_input": Hidden("squared", "share", 1.0, 1.0, 1.0, 1.0, 1.0),
     "negative_damping": Hidden("push", "1/s", None, 5.0, 2.0, None, None),
     "missing_input": Hidden("missing", "L/s^2, tanks L/s, standard deviation", 0.7, 40.0, 12.0, 0.1, 0.1),
 }
@@ -67,7 +72,8 @@ def suitable(rig: str, outside: bool = False) -> tuple[str, ...]:
 def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
     """Turn the strength of each effect into its true size on a rig, in physical units (the tables' column `unit`).
 
-    Sizes grow with the strength s; a limit comes down from the full range as full / (1 + s (full / strong - 1)).
+    Sizes grow with the strength s, but a rate falls as strong / s, and a limit comes down from the full range as
+    full / (1 + s (full / strong - 1)).
     """
     if rig not in RIGS:
         raise ValueError(f"there is no rig {rig!r}; known are {', '.join(RIGS)}")
@@ -79,8 +85,10 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
             known = ", ".join((*suitable(rig), *suitable(rig, outside=True)))
             raise ValueError(f"{name!r} cannot be hidden in {rig!r}; what can be: {known}")
         sizes[name] = strength * strong
-        if row.field in {"limit", "sensor_limit", "rim"}:
-            full = RIGS[rig].largest_input if row.field == "limit" else RIGS[rig].reach
+        if row.field == "rate":
+            sizes[name] = strong / strength if strength > 0 else inf
+        elif row.field in {"limit", "inner_limit", "sensor_limit", "rim", "stop"}:
+            full = RIGS[rig].largest_input if row.field in {"limit", "inner_limit"} else RIGS[rig].reach
             sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":
             sizes[name] = 1.0

@@ -12,13 +12,19 @@ from numpy.random import Generator
 from simgap.data.simulated.rigs.kernels import Body, Drive, Tanks, fill, move
 from simgap.data.simulated.rigs.plants import Rig
 
+SLIP = 0.6  # of a sticking valve: the jump as a share of the band
+INNER_LAG = 5.0  # samples, of the lag before a limit
+
 
 def simulate_motion(
     rig: Rig, size: Mapping[str, float], u: np.ndarray, start_rng: Generator, missing_rng: Generator, substeps: int
 ) -> Float[np.ndarray, "n ny"]:
     """Integrate the true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
     other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
-    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf)}
+    known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf), "rate": size.get("rate", inf)}
+    if "inner_limit" in size:  # and a lag before it
+        known["lag"] = INNER_LAG * rig.dt if size["inner_limit"] < inf else 0.0
+    known |= {"inner_limit": size.get("inner_limit", inf), "slip": SLIP * size.get("stick", 0.0)}
     drive = Drive(**{field: known.get(field, size.get(field, 0.0)) for field in Drive._fields})
     offset, middle = rig.start * np.clip(start_rng.standard_normal(2), -2, 2), rig.middle
     first, second = (float(value) for value in offset + middle)
@@ -28,7 +34,7 @@ def simulate_motion(
         tanks = Tanks(**{field: known.get(field, size.get(field, 0.0)) for field in Tanks._fields})
         return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
     known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
-    known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7}
+    known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7, "stop": size.get("stop", inf)}
     body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
     motion = move(body, drive, u, other, first, second, rig.dt, substeps)
     return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]

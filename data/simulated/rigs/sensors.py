@@ -22,7 +22,7 @@ def measure(
     rng: Generator,
     substeps: int,
 ) -> Float[np.ndarray, "T ny"]:
-    """Read the motion at the samples: lag, absolute value, drift and bias, noise, limit, counts, outliers."""
+    """Read the motion at the samples: lag, absolute value, curve, drift and bias, noise, limit, counts, outliers."""
     drift_rng, bias_rng, noise_rng, outlier_rng = rng.spawn(4)
     y = motion[::substeps].copy()
     first = motion[:, 0]
@@ -35,6 +35,7 @@ def measure(
     reading = first[::substeps].copy()
     if "absolute" in size:
         reading = np.abs(reading)
+    reading += size.get("sensor_squared", 0.0) * reading * (np.abs(reading) / rig.reach - 1)
     reading += size.get("bias", 0.0) * bias_rng.standard_normal()
     reading += size.get("drift", 0.0) * drift_rng.standard_normal() * rig.dt * np.arange(len(reading))
     y[:, 0] = reading

@@ -1,0 +1,56 @@
+"""Effects whose state runs on from sample to sample, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+# Where a command just reaches or just misses a slip, within this share of the jump, a part of the jump is shown for one
+# sample, as if the command had moved steadily there: then the simulation changes steadily with both numbers of a
+# sticking valve, and a fit finds them.
+SOFT = 0.3
+
+
+@njit(cache=True, nogil=True)
+def stem(u, low, high, every):
+    """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it."""
+    position = np.empty_like(u)
+    for e in range(len(u)):
+        at, moving, last = 0.0, 0.0, 0.0
+        for k in range(0, u.shape[1], every):
+            change, away = u[e, k] - last, u[e, k] - at
+            last = u[e, k]
+            if change * moving > 0.0:
+                shown = at = last - math.copysign(low, moving)
+            else:
+                near = max(min(abs(change), SOFT * (high - low)), 1e-300)
+                share = min(max(0.5 + (abs(away) - high) / near, 0.0), 1.0)
+                side = math.copysign(1.0, away)
+                shown = at + share * (away - side * low)
+                moving = side if share >= 0.5 else 0.0
+                if share >= 0.5:
+                    at = last - side * low
+            position[e, k : k + every] = shown
+    return position
+
+
+@njit(cache=True, nogil=True)
+def limited_rate(u, up, down):
+    """Compute the mean over each step of what follows u [E, K] by no more than `up` and `down` per step."""
+    mean = np.empty_like(u)
+    for e in range(len(u)):
+        at = u[e, 0]
+        for k in range(u.shape[1]):
+            way = u[e, k] - at
+            speed = up if way > 0.0 else down
+            if abs(way) > speed:
+                moved = math.copysign(speed, way)
+                mean[e, k] = at + 0.5 * moved
+                at += moved
+            else:
+                # It arrives after the share |way| / speed of the step; so much of it is half a way short.
+                mean[e, k] = u[e, k] - (0.5 * way * abs(way) / speed if speed > 0.0 else 0.0)
+                at = u[e, k]
+    return mean
