@@ -20,7 +20,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "data": GROUND,
     "results": GROUND | {"metrics", "tasks"},
     "running": GROUND | {"metrics", "tasks", "results", "data"},
-    "greybox": GROUND | {"findings"},
+    "greybox": GROUND | {"findings", "error_views"},
     "error_views": {"records", "metrics", "findings", "wording"},
     "baselines": GROUND | {"data", "greybox"},
     "neural": GROUND | {"data"},

@@ -169,9 +169,15 @@ class Plant:
     @property
     def n_start(self) -> int:
         """Length of the initial state: an imposed motion starts with what its forces remember, -1 to 1 each."""
-        if self.imposed:
-            return sum(term.effect.memory for term in self.forces if term.effect.role == "force")
-        return self.order
+        return len(self.remembered) if self.imposed else self.order
+
+    @cached_property
+    def remembered(self) -> tuple[Term, ...]:
+        """The terms that an imposed motion finds in an unknown state, those of the input first."""
+        return tuple(
+            term for port in ("input", "force") for term in self.terms
+            if term.effect.port == port and term.effect.memory and term.effect.role != "friction"
+        )  # fmt: skip
 
     @property
     def n_local(self) -> int:

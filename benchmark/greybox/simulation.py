@@ -61,8 +61,7 @@ class Simulator:
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory, *([memory[-1]] * unused)])  # one more: where the last one's memory ends
         self._memory = np.zeros(max(1, int(memory[-1])))
-        ends = zip(forces, memory, memory[1:], strict=False)
-        self._remembered = [m for term, at, end in ends if term.effect.role == "force" for m in range(at, end)]
+        self._remembered = [at for term, at in zip(forces, memory, strict=False) if term in plant.remembered]
 
     def states(
         self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E n"]
@@ -94,10 +93,11 @@ class Simulator:
     def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
         """Compute the forces that the motion takes, and the rates of the drive."""
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
-        begun[:, self._remembered] = np.clip(start, -1.0, 1.0)
+        start = np.clip(start, -1.0, 1.0)
+        begun[:, self._remembered] = start[:, start.shape[1] - len(self._remembered) :]
         follow_motion(
-            self.drive(theta), np.ascontiguousarray(self.arriving(theta, 0)), self.h, self._terms, self._n_terms,
-            self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
+            self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start)), self.h,
+            self._terms, self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
         )  # fmt: skip
         return states
 
@@ -106,34 +106,42 @@ class Simulator:
     ) -> tuple[Float[np.ndarray, "E T"], Float[np.ndarray, "E T"]]:
         """Simulate position and velocity, as the forces see them."""
         if self.plant.imposed:
-            x = self.arriving(theta, 0)
+            x = self.arriving(theta, 0, np.clip(local, -1.0, 1.0))
             return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
         states = self.states(theta[None], local[None, :, : self.plant.n_start])[0]
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
-    def drive(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
-        """Compute b u + d after the actuators' effects, for every substep."""
+    def drive(
+        self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
+    ) -> Float[np.ndarray, "E K"]:
+        """Compute b u + d after the actuators' effects, for every substep; `start` is what these remember."""
         plant = self.plant
         gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
         total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
         for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
-            arriving = self.arriving(theta, channel)
+            arriving = self.arriving(theta, channel, start)
             for tap, gain in zip(plant.taps, of_channel, strict=True):
                 total += gain * shifted(arriving, tap * self.substeps)
         return total
 
-    def arriving(self, theta: Float[np.ndarray, " p"], channel: int) -> Float[np.ndarray, "E K"]:
+    def arriving(
+        self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None
+    ) -> Float[np.ndarray, "E K"]:
         """Pass one input through its effects; the answer is kept, because most parameters do not change it."""
         terms = self.plant.on("input", channel)
         if not terms:
             return self._u[channel]
         values = [theta[self.plant.part_of(term)] for term in terms]
-        key = np.concatenate([[channel], *values]).tobytes()
+        known = [] if start is None else [self.plant.remembered.index(t) for t in terms if t in self.plant.remembered]
+        key = np.concatenate([[channel], *values, *(start[:, i] for i in known)]).tobytes()
         if key not in self._drives:
             u = self._u[channel]
             for term, p in zip(terms, values, strict=True):
                 assert isinstance(term.effect, InputEffect)
-                u = term.effect.term(u, p, self.h)
+                if known and term in self.plant.remembered:
+                    u = term.effect.term_from(u, p, self.h, start[:, self.plant.remembered.index(term)])
+                else:
+                    u = term.effect.term(u, p, self.h)
             if len(self._drives) > 1 + len(values):
                 self._drives.pop(next(iter(self._drives)))
             self._drives[key] = u

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, Problem
 from simgap.greybox.noise import log_likelihood
@@ -16,6 +17,7 @@ from simgap.greybox.score_test import STARTS, candidates
 
 # The chance, over the whole catalogue, that noise alone passes for an effect.
 FALSE_NAMES = 1e-3
+WAYS = 2  # in which an effect may pass: by one-step errors and by free runs
 # What held-out data must add to the log-likelihood: odds of 20 to 1.
 HELD_OUT = 3.0
 # The mean gain of the held-out blocks over its standard error: one in ten by chance.
@@ -83,15 +85,32 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial, together: int
     """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
 
     2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried, when
-    so many effects are added together.
+    so many effects are added together. L is that of one-step errors, or of free runs: an effect may take most of what
+    is wrong in the long run and leave the next sample as hard to forecast as it was.
     """
-    ratio = larger.train - smaller.train
+    ratio = max(larger.train - smaller.train, free_run_ratio(baseline, smaller, larger))
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
     tried = (len(candidates(baseline, smaller.terms)) * STARTS) ** together
-    chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried
+    chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
     gain = smaller.estimate.squares - larger.estimate.squares
     matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.squares
     return bool(matters and chance < FALSE_NAMES and holds_out(baseline, smaller, larger))
+
+
+def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
+    """Compute log(L_larger / L_smaller) of the free-run errors in training, counted in independent samples.
+
+        sum over outputs of N / (2 tau) log(s_smaller^2 / s_larger^2)
+
+    tau is the time over which the errors of the larger model remember themselves (Bartlett 1946).
+    """
+    mask, ratio = baseline.train.mask, 0.0
+    for j in range(baseline.plant.ny):
+        before, after = (trial.estimate.errors[..., j][mask] for trial in (smaller, larger))
+        tau, _ = correlation_time(after, mask.sum(axis=1), 0)
+        least = len(after) * baseline.resolution[j] ** 2
+        ratio += 0.5 * len(after) / tau * math.log((before @ before + least) / (after @ after + least))
+    return ratio
 
 
 def promises(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:

@@ -26,6 +26,7 @@ class Backlash(InputEffect):
         "Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38, 2002, sec. 2"
     )
     place_in_chain: ClassVar[int] = 60
+    memory: ClassVar[int] = 1
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "input")
     confounders: ClassVar[dict[str, str]] = {
         "hysteresis": (
@@ -62,8 +63,17 @@ class Backlash(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u behind a gap of width p[0]; before the record the input came from zero."""
+        return Backlash.behind_gap(u, p, np.zeros(len(u)))
+
+    @staticmethod
+    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
+        """Return u behind a gap in which each record begins at -1 (one side) to 1 (the other)."""
+        return Backlash.behind_gap(u, p, u[:, 0] + 0.5 * p[0] * start)
+
+    @staticmethod
+    def behind_gap(u: np.ndarray, p: np.ndarray, output: np.ndarray) -> np.ndarray:
+        """Return u behind a gap, from the output before."""
         low, high = u - 0.5 * p[0], u + 0.5 * p[0]
-        output = np.zeros(len(u))
         outputs = np.empty_like(u)
         for k in range(u.shape[1]):
             output = np.minimum(np.maximum(output, low[:, k]), high[:, k])

@@ -120,6 +120,8 @@ class Effect(ABC):
     contains: ClassVar[tuple[str, ...]] = ()
     # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
     memory: ClassVar[int] = 0
+    # What the simulation does with the value of a force term.
+    role: ClassVar[Role] = "force"
     # Substeps per sample that the term needs.
     substeps: ClassVar[int] = 1
     # Where several effects act on one signal, it passes them in ascending order.
@@ -170,12 +172,16 @@ class InputEffect(Effect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return what arrives of u [E, K], both constant over steps of h seconds; the record starts at rest."""
 
+    @staticmethod
+    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
+        """Return the same for records that start with this much in memory, -1 to 1; for terms that have any."""
+        raise NotImplementedError
+
 
 class ForceEffect(Effect):
     """An effect that acts on the plant together with the input."""
 
     port: ClassVar[Port] = "force"
-    role: ClassVar[Role] = "force"
     substeps: ClassVar[int] = 4
     # Compiled by the simulator and called once per substep as term(x, v, t, h, p, i, m, j): position x, velocity v,
     # time t and substep h in s; its parameters are p[i], p[i + 1], ..., its states m[j], ...

@@ -48,8 +48,9 @@ class Hysteresis(ForceEffect):
 
         A gap is looked for where the motion is imposed; in a drive, backlash is an effect of its own.
         """
+        least = 0 if scales.order == 0 else -10  # a motion that is imposed is braked, never driven
         return (
-            Parameter("force", scales.force_unit, -10 * scales.force_rms, 10 * scales.force_rms),
+            Parameter("force", scales.force_unit, least * scales.force_rms, 10 * scales.force_rms),
             Parameter("travel", scales.unit(1, 0), 0.003 * scales.stroke, 2 * scales.stroke),
             Parameter("gap", scales.unit(1, 0), 0.0, scales.stroke) if scales.order == 0 else Parameter.absent("gap"),
         )
