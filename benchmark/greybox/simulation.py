@@ -96,8 +96,8 @@ class Simulator:
         start = np.clip(start, -1.0, 1.0)
         begun[:, self._remembered] = start[:, start.shape[1] - len(self._remembered) :]
         follow_motion(
-            self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start)), self.h,
-            self._terms, self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
+            self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start)), self.h, self._terms,
+            self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
         )  # fmt: skip
         return states
 
