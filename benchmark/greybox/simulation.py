@@ -95,9 +95,10 @@ class Simulator:
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
         start = np.clip(start, -1.0, 1.0)
         begun[:, self._remembered] = start[:, start.shape[1] - len(self._remembered) :]
+        drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
         follow_motion(
-            self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start)), self.h, self._terms,
-            self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
+            drive, motion, self.h, self._terms, self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at,
+            self._m_at, begun, self._memory, states,
         )  # fmt: skip
         return states
 
