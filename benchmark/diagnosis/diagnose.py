@@ -18,6 +18,7 @@ from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
+from simgap.greybox.selection import MAX_TERMS
 from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset
 
@@ -64,7 +65,9 @@ def diagnose(
     left, offers = _left(evidence, dataset)
     explained = min((plant.explained for plant in evidence), default=0.0) if causes else 0.0
     verdict: Verdict = "named" if causes else "nothing_found"
-    if not doubt and left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained:
+    # A search that was stopped at the largest number of effects might have gone on: none of them is the explanation.
+    endless = any(len(plant.selection.trial.terms) >= MAX_TERMS for plant in evidence)
+    if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
         verdict, causes = "unexplained", ()
     if not causes:
         after = before

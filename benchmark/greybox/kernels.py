@@ -195,21 +195,21 @@ def follow_motion(drive, motion, dt, terms, n_terms, roles, theta, p_at, m_at, b
             memory[i] = begun[experiment, i]
         side = 0.0
         for k in range(drive.shape[1]):
-            x, v, rate = motion[experiment, k], 0.0, 0.0
-            if k > 0:
-                v = (x - motion[experiment, k - 1]) / dt
-                rate = (drive[experiment, k] - drive[experiment, k - 1]) / dt
+            x, h = motion[experiment, k], dt if k > 0 else 0.0
+            before, after, last = max(k - 1, 0), min(k + 1, drive.shape[1] - 1), max(k, 1)
+            v = (motion[experiment, last] - motion[experiment, last - 1]) / dt if after > before else 0.0
+            rate = (drive[experiment, after] - drive[experiment, before]) / (max(after - before, 1) * dt)
             if v != 0.0:
                 side = 1.0 if v > 0.0 else -1.0
             force = drive[experiment, k]
             for q in range(n_terms):
                 if roles[q] == FORCE:
-                    force -= terms[q](x, v, k * dt, dt, theta, p_at[q], memory, m_at[q])
+                    force -= terms[q](x, v, k * dt, h, theta, p_at[q], memory, m_at[q])
             for q in range(n_terms):
                 if roles[q] == FRICTION:
                     if m_at[q] < m_at[q + 1]:
                         memory[m_at[q]] = abs(force)
-                    force += side * terms[q](x, v, k * dt, dt, theta, p_at[q], memory, m_at[q])
+                    force += side * terms[q](x, v, k * dt, h, theta, p_at[q], memory, m_at[q])
             states[experiment, k, 0] = force
             states[experiment, k, 1] = rate
 

@@ -13,7 +13,7 @@ from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, Problem, initial_states
 from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
-from simgap.greybox.plant import Plant
+from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.samples import RESOLUTION, Records, excerpts
 from simgap.greybox.score_test import add, candidates
@@ -59,12 +59,17 @@ def find_baseline(
     for simpler in (fit for fit in models[:-1] if not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost no more, do as well.
         other = baseline_of(simpler)
-        instead = [term for term in candidates(other) if term.effect.instead_of_order and not term.channel]
+        instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
         if any(block_errors(add(other, other.estimate, term), held_out, n_init).mean() <= to_beat for term in instead):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
+
+
+def _instead_of_order(term: Term, plant: Plant) -> bool:
+    """Tell whether an effect may explain what else asks for a higher order; behind an imposed motion, play looks so."""
+    return not term.channel and (term.effect.instead_of_order or (plant.imposed and term.effect.memory > 0))
 
 
 def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> list[Estimate]:

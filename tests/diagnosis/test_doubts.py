@@ -1,0 +1,52 @@
+"""Records on which nothing can be named: they show the controller, or no model beats their mean."""
+
+import numpy as np
+import pytest
+
+from simgap.diagnosis.diagnose import diagnose
+from simgap.diagnosis.doubts import shows_controller
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
+
+CHANNELS = Channels((Channel("op", "%"),), (Channel("pv", "m", "level"),))
+
+
+def loop(seed, closed, samples=800):
+    """A level under a disturbance, with a controller that sets the valve in the same sample, or with random steps."""
+    rng = np.random.default_rng(seed)
+    level, valve, pv, op = 0.0, 0.0, np.empty(samples), np.empty(samples)
+    disturbance = np.cumsum(0.2 * rng.standard_normal(samples))
+    for k in range(samples):
+        pv[k] = level
+        valve = -4.0 * level if closed else (rng.uniform(-1, 1) if k % 20 == 0 else valve)
+        op[k] = valve
+        level += 0.05 * (valve + disturbance[k] * closed - 0.3 * level)
+    return Experiment(f"e{seed}", op[:, None], pv[:, None], 1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_controller_is_seen_by_the_sample_that_it_answers_in(seed):
+    assert "shows the controller" in (shows_controller([loop(seed, closed=True)], CHANNELS) or "")
+    assert shows_controller([loop(seed, closed=False)], CHANNELS) is None
+
+
+def test_nothing_is_named_on_a_record_of_the_controller_and_the_first_sentence_says_so():
+    made = [loop(seed, closed=True) for seed in range(5)]
+    training = TrainingSet(tuple(made[:3]), (made[3],), 10, CHANNELS)
+    answer = diagnose(Dataset("loop", training, (made[4],), 10, CHANNELS), views_too=False)
+    assert answer.findings.verdict == "nothing_found" and not answer.causes and not answer.findings.suspects
+    assert "shows the controller" in answer.findings.checks[0]
+
+
+def test_nothing_is_named_where_the_mean_is_the_better_model():
+    rng = np.random.default_rng(0)
+    made = []
+    for i in range(5):  # the output has nothing to do with the input, and works around another level each time
+        u = np.repeat(rng.uniform(-1, 1, 30), 10)[:, None]
+        made.append(Experiment(f"e{i}", u, 10 * i + rng.standard_normal((300, 1)), 1.0))
+    channels = Channels((Channel("u", "V"),), (Channel("y", "m/s", "velocity"),))
+    training = TrainingSet(tuple(made[:3]), (made[3],), 10, channels)
+    answer = diagnose(Dataset("unrelated", training, (made[4],), 10, channels), views_too=False)
+    assert not answer.causes
+    assert any(
+        "better than its mean" in sentence and "operating point" in sentence for sentence in answer.findings.checks
+    )

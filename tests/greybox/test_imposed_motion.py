@@ -1,0 +1,86 @@
+"""A motion imposed on a machine, and the force that it takes: no dynamics, and friction in the plant itself."""
+
+import numpy as np
+import pytest
+
+from simgap.diagnosis.diagnose import diagnose
+from simgap.records import Channel, Channels, Dataset, TrainingSet
+
+from .parts import experiments
+
+DT = 0.01
+
+
+def strokes(rng, count=8, samples=1200):
+    """Slow motions [E, T] in mm that swing over changing strokes, each from another place."""
+    t = DT * np.arange(samples)
+    parts = [np.sin(2 * np.pi * rate * t + phase) for rate, phase in zip((0.7, 1.1), (0.3, 1.7), strict=True)]
+    mixed = rng.uniform(4, 12, (count, 2)) @ np.stack(parts)
+    return mixed + rng.uniform(-3, 3, (count, 1))
+
+
+def slipping(x, stiffness, gap, most, begin):
+    """Force of a spring with a gap that slips at `most`, over x [T]: by a bristle that is dragged along."""
+    reach = gap / 2 + most / stiffness  # that the bristle is bent at most
+    bent, forces = begin * reach, np.empty_like(x)
+    for k, step in enumerate(np.diff(x, prepend=x[0])):
+        bent = np.clip(bent + step, -reach, reach)
+        forces[k] = stiffness * np.sign(bent) * max(abs(bent) - gap / 2, 0.0)
+    return forces
+
+
+def play(x, gap, begin):
+    """What arrives of x [T] behind a gap, from anywhere in it."""
+    at, arrived = x[0] + 0.5 * gap * begin, np.empty_like(x)
+    for k, here in enumerate(x):
+        at = min(max(at, here - gap / 2), here + gap / 2)
+        arrived[k] = at
+    return arrived
+
+
+def dataset(respond, seed, noise=0.05):
+    """Force over imposed position, each record begun in the middle of a motion."""
+    rng = np.random.default_rng(seed)
+    x = strokes(rng)
+    force = np.stack([respond(of_one, begin) for of_one, begin in zip(x, rng.uniform(-1, 1, len(x)), strict=True)])
+    force = force + noise * force.std() * rng.standard_normal(force.shape)
+    made = experiments(x, force[:, :, None], DT)
+    channels = Channels((Channel("x", "mm"),), (Channel("force", "kN", "other"),))
+    return Dataset(
+        "damper", TrainingSet(tuple(made[:4]), tuple(made[4:5]), 10, channels), tuple(made[5:]), 10, channels
+    )
+
+
+def first_name(answer):
+    """The verdict with its first cause."""
+    return answer.findings.verdict, *[cause.effect for cause in answer.causes[:1]]
+
+
+@pytest.mark.parametrize("gap", [0.0, 6.0])
+def test_a_spring_that_slips_is_hysteresis_with_the_gap_that_it_crosses(gap):
+    answer = diagnose(dataset(lambda x, begin: slipping(x, 2.0, gap, 5.0, begin) + 0.1 * x, seed=1), views_too=False)
+    assert first_name(answer) == ("named", "hysteresis")
+    values = {value.name: value.value for value in answer.causes[0].parameters}
+    # The law rounds the corner at which the spring slips, so that no number has an exact counterpart.
+    assert values["force"] == pytest.approx(5.0, rel=0.2) and values["gap"] == pytest.approx(gap, abs=0.8)
+
+
+def test_a_valve_with_play_is_backlash_wherever_in_its_gap_a_record_begins():
+    answer = diagnose(dataset(lambda x, begin: 3.0 * play(x, 4.0, begin), seed=2), views_too=False)
+    assert first_name(answer) == ("named", "backlash")
+    assert answer.causes[0].parameters[0].value == pytest.approx(4.0, rel=0.2)
+
+
+def test_dry_friction_is_named_where_there_is_nothing_but_friction():
+    def respond(x, begin):
+        return 0.3 * x + 2.0 * np.sign(np.diff(x, prepend=x[0]))
+
+    assert first_name(diagnose(dataset(respond, seed=3), views_too=False)) == ("named", "coulomb_friction")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_spring_with_a_damper_has_nothing_to_name(seed):
+    def respond(x, begin):
+        return 0.3 * x + 0.05 * np.gradient(x, DT)
+
+    assert first_name(diagnose(dataset(respond, seed), views_too=False)) == ("nothing_found",)
