@@ -182,6 +182,7 @@ class Findings:
     units: dict[str, str] = field(default_factory=dict)
     inputs: tuple[tuple[str, str], ...] = ()  # names and units
     kinds: dict[str, str] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()  # why nothing can be named on these records, one sentence each
     checks: tuple[str, ...] = ()  # what the data checks found, one sentence each
     left: float = 0.0  # share of what remains after the causes that could still be predicted from the input
     offers: tuple[Offer, ...] = ()
@@ -209,6 +210,7 @@ class Findings:
             "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
             "gain": vars(self.gain),
+            "doubts": list(self.doubts),
             "checks": list(self.checks),
             "left": self.left,
             "offers": [vars(offer) for offer in self.offers],

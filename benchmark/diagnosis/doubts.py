@@ -58,7 +58,7 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
         why = f"the held-out data have {baseline.valid.samples} samples. Record more"
     else:
         why = f"the inputs do not move {name} enough. Move them more, and faster"
-    return f"No model simulates held-out {name} better than its mean, so nothing is named: {why}."
+    return f"No model simulates held-out {name} better than its mean, because {why}."
 
 
 def _correlation(changes: Sequence[tuple[np.ndarray, np.ndarray]], lag: int) -> float:

@@ -16,6 +16,8 @@ LAST = "frequency band"  # says where the error is, but nothing about its cause:
 def headline(findings: Findings) -> str:
     """Say the verdict in a sentence."""
     gain = findings.gain
+    if findings.doubts:
+        return f"Nothing is named. {findings.doubts[0]}"
     if findings.verdict == "nothing_found":
         return (
             "Nothing found: no effect of the catalogue makes the plain linear model simulate these data better, and "

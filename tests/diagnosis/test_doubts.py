@@ -34,7 +34,8 @@ def test_nothing_is_named_on_a_record_of_the_controller_and_the_first_sentence_s
     training = TrainingSet(tuple(made[:3]), (made[3],), 10, CHANNELS)
     answer = diagnose(Dataset("loop", training, (made[4],), 10, CHANNELS), views_too=False)
     assert answer.findings.verdict == "nothing_found" and not answer.causes and not answer.findings.suspects
-    assert "shows the controller" in answer.findings.checks[0]
+    assert "shows the controller" in answer.findings.doubts[0]
+    assert str(answer).startswith("loop: Nothing is named. op answers pv")
 
 
 def test_nothing_is_named_where_the_mean_is_the_better_model():
@@ -48,5 +49,5 @@ def test_nothing_is_named_where_the_mean_is_the_better_model():
     answer = diagnose(Dataset("unrelated", training, (made[4],), 10, channels), views_too=False)
     assert not answer.causes
     assert any(
-        "better than its mean" in sentence and "operating point" in sentence for sentence in answer.findings.checks
+        "better than its mean" in sentence and "operating point" in sentence for sentence in answer.findings.doubts
     )
