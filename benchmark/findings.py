@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -182,8 +183,8 @@ class Findings:
     seed: int = 0
 
     def to_json(self) -> dict[str, Any]:
-        """Schema 1 of `simgap diagnose --json`."""
-        return {
+        """Schema 1 of `simgap diagnose --json`; what is infinite or undefined is null: JSON has no such number."""
+        answer = {
             "schema": 1,
             "dataset": self.dataset,
             "verdict": self.verdict,
@@ -216,3 +217,12 @@ class Findings:
             "seed": self.seed,
             "seconds": self.seconds,
         }
+        return _only_numbers(answer)
+
+
+def _only_numbers(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _only_numbers(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_only_numbers(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

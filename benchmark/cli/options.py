@@ -43,7 +43,7 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
             raise UnusableInput(f"--param {pair}: write it as name=value")
         try:
             params[name] = tomllib.loads(f"value = {text}")["value"]
-        except ValueError:  # TOMLDecodeError, and a date in month 13
+        except (ValueError, RecursionError):  # TOMLDecodeError, a date in month 13, lists in lists without end
             params[name] = text  # a word without quotes
     return params
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,11 +13,12 @@ from simgap.diagnosis import checks, gains
 from simgap.diagnosis.answer import Diagnosis
 from simgap.error_views.views import views
 from simgap.findings import Cause, Findings, Offer, Trace, Verdict, Wrong
+from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
-from simgap.metrics import relative
+from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset
 
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
@@ -50,6 +52,7 @@ def diagnose(
     begin = time.perf_counter()
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
     dataset = with_kinds(dataset, kind)
+    check_numbers(dataset.test, dataset.channels)
     identified = identify(dataset.training)
     model = GreyBoxModel([one.plant for one in identified])
     plain = GreyBoxModel([one.plain for one in identified])
@@ -104,9 +107,11 @@ def _baseline(plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray
     y = np.concatenate([x.y[dataset.n_init :] for x in dataset.test])
     y_hat = np.concatenate(before)
     for i, channel in enumerate(dataset.channels.outputs):
-        error = float(np.sqrt(np.mean((y[:, i] - y_hat[:, i]) ** 2)))
+        grown = not is_finite(y_hat[:, i])
+        error = math.inf if grown else float(np.sqrt(np.mean((y[:, i] - y_hat[:, i]) ** 2)))
         rmse[channel.name] = error
-        fit[channel.name] = relative(error, float(np.std(y[:, i])))["fit_percent"]
+        std = spread(y[:, i])
+        fit[channel.name] = relative(error, std)["fit_percent"] if std else math.nan
     orders = plain.fitted["order"]
     return {"order": orders[0] if len(orders) == 1 else orders, "rmse": rmse, "fit_percent": fit}
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 
 from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.noise import Noise, white
+from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.samples import Records
@@ -33,10 +34,15 @@ class Baseline:
         """The plant without effects."""
         return self.estimate.plant
 
+    @property
+    def resolution(self) -> Float[np.ndarray, " ny"]:
+        """The smallest error of each output that means anything, in training and in held-out data."""
+        return self.train.resolution
+
     @cached_property
     def noise(self) -> Noise:
         """White noise as large as the errors of the plain model; it weighs the outputs against each other."""
-        return white(np.sqrt(np.mean(self.estimate.errors[self.train.mask] ** 2, axis=0)) + 1e-300)
+        return white_as_large_as(self.estimate.errors, self.train.mask, self.train.resolution)
 
     @cached_property
     def squares(self) -> float:

@@ -182,7 +182,7 @@ class Evidence:
 
 def gained(smaller: Trial, larger: Trial) -> float:
     """Return the share of the held-out squared error that the larger model takes away."""
-    return float(1 - larger.blocks.sum() / max(smaller.blocks.sum(), 1e-300))
+    return float(1 - larger.blocks.sum() / smaller.blocks.sum())
 
 
 # How an error behaves that each view shows.
@@ -239,6 +239,8 @@ def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.nd
     plant, theta = estimate.plant, estimate.theta
     jacobian = Problem(plant, fitted.records, noise).jacobian(theta, estimate.local, plant.free)
     white = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
+    if not jacobian.finite:
+        return plant.low, plant.high
     normal = NormalEquations.of(jacobian, white)
     h, weights, _ = normal.reduced(0.0)
     # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
@@ -247,9 +249,11 @@ def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.nd
     parts = np.array_split(own * white, per_record, axis=2)
     g = np.concatenate([part.sum(axis=2).T for part in parts])  # [blocks, p]
     inside = plant.free & (np.diag(normal.h) > 0)
-    inverse = np.linalg.pinv(h[np.ix_(inside, inside)], rcond=1e-12, hermitian=True)
+    scale = np.sqrt(np.diag(normal.h)[inside])  # which directions the data tell does not depend on the units
+    inverse = np.linalg.pinv(h[np.ix_(inside, inside)] / scale / scale[:, None], rcond=1e-12, hermitian=True)
     used = len(g) / max(1, len(g) - 1)
-    covariance = inverse @ (g.T @ g)[np.ix_(inside, inside)] @ inverse * used
+    moved = (g[:, inside] / scale) @ inverse
     reach = np.full(len(theta), 0.0)
-    reach[inside] = student.ppf(0.975, max(2, len(g) - 1)) * np.sqrt(np.maximum(np.diag(covariance), 0))
+    deviations = np.sqrt(used * np.sum(moved**2, axis=0)) / scale
+    reach[inside] = student.ppf(0.975, max(2, len(g) - 1)) * deviations
     return np.maximum(theta - reach, plant.low), np.minimum(theta + reach, plant.high)

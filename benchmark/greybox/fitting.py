@@ -9,14 +9,17 @@ from jaxtyping import Float
 
 from simgap.greybox.levenberg import minimise
 from simgap.greybox.noise import Noise
-from simgap.greybox.normal_equations import Jacobian, NormalEquations
+from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
-from simgap.greybox.samples import Records
+from simgap.greybox.samples import RESOLUTION, Records
 from simgap.greybox.simulation import Simulator
 
-LARGEST_ERROR = 1e60  # of a simulation that grows without bound; its square is still a number
+# In sizes of the output: the error of a simulation that grows without bound; its square is still a number.
+LARGEST_ERROR = 1e60
+SMALL = 1e-3  # share of the size of other numbers that a number near zero counts as
 DIFFERENCE = 1e-5  # of a parameter's size: the step of its numerical slope
 INITIAL_STEPS = 15
+SLOWEST = 1e-6  # share of a sample's change by which a tank empties that counts as one at all
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +40,11 @@ class Problem:
     def __init__(self, plant: Plant, records: Records, noise: Noise) -> None:
         self.plant, self.records, self.noise = plant, records, noise
         self.simulator = Simulator(plant, records.u)
-        # Finite differences are in proportion to the readings in training, not to those of the few samples at hand.
-        spread = [s.y_rms for s in plant.scales.outputs] if plant.scales else np.std(records.y[records.mask], axis=0)
-        self._spread = np.asarray(spread) + 1e-12
+        # The readings in training tell the sizes of the outputs, not the few samples that may be at hand.
+        self._sizes = plant.scales.output_sizes[: plant.ny] if plant.scales else records.sizes
+        # What rounding adds to the square of each reading: a perfect fit has that, and none is better. [ny]
+        self.least = (RESOLUTION * self._sizes / noise.deviations) ** 2
+        self._measured = records.mask[:, :, None]
 
     def only(self, experiments: np.ndarray) -> Problem:
         """Return the same problem for some of the experiments."""
@@ -51,20 +56,21 @@ class Problem:
 
     def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
         """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
-        errors = (self.records.y - self.simulator.run(theta, local)) * self.records.weights
-        if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR:  # nor when it is not a number
-            errors = np.clip(np.nan_to_num(errors, nan=LARGEST_ERROR), -LARGEST_ERROR, LARGEST_ERROR)
+        errors = np.where(self._measured, self.records.y - self.simulator.run(theta, local), 0.0)
+        if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR * self._sizes.min():  # nor when it is not a number
+            largest = LARGEST_ERROR * self._sizes
+            errors = np.clip(np.where(np.isnan(errors), largest, errors), -largest, largest)
         return errors
 
     def squares(self, errors: np.ndarray) -> float:
-        """Sum the squares of the whitened errors."""
+        """Sum the squares of the whitened errors, and what rounding adds to them."""
         white = self.noise.whiten(errors)
-        value = float(np.vdot(white, white))
-        return value if np.isfinite(value) else np.inf
+        return float(np.vdot(white, white)) + float(self.least.sum()) * self.records.samples
 
     def squares_of_each(self, errors: np.ndarray) -> Float[np.ndarray, " E"]:
         """Sum the squares of the whitened errors of each experiment."""
-        return np.sum(self.noise.whiten(errors) ** 2, axis=(1, 2))
+        rounding = self.least.sum() * self.records.mask.sum(axis=1)
+        return np.sum(self.noise.whiten(errors) ** 2, axis=(1, 2)) + rounding
 
     def at_rest(self, theta: np.ndarray) -> Float[np.ndarray, "E q"]:
         """Guess the initial states of a plant that stood at its first reading."""
@@ -73,7 +79,7 @@ class Problem:
         if plant.cascade:
             local[:, plant.order - 1] = first[:, 0]
             for i in range(plant.order - 2, -1, -1):
-                rate = theta[i] if theta[i] > 0 else 1.0
+                rate = max(theta[i], SLOWEST / plant.dt)
                 local[:, i] = local[:, i + 1] * theta[i + 1] / rate
         else:
             local[:, 0] = first[:, 0]
@@ -97,7 +103,7 @@ class Problem:
         plant, which = self.plant, np.flatnonzero(which)
         sizes, high = self.sizes(theta), plant.high
         steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
-        starts = [DIFFERENCE * self._spread[0] * (plant.dt**-i if not plant.cascade else 1.0)
+        starts = [DIFFERENCE * self._sizes[0] * (plant.dt**-i if not plant.cascade else 1.0)
                   for i in range(plant.order)]  # fmt: skip
         thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
@@ -109,7 +115,8 @@ class Problem:
         m = here.shape[1] * here.shape[2]
 
         def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
-            change = (moved - here) * (self.records.weights / step)
+            with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
+                change = np.where(self._measured, (moved - here) / step, 0.0)
             return self.noise.whiten(change).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
@@ -119,24 +126,45 @@ class Problem:
         for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
             of_local[i] = slope(moved, step)
         for i, term in enumerate(plant.per_experiment, start=plant.order):
-            step = self._spread[term.channel] / self.records.duration
+            step = self._sizes[term.channel] / self.records.duration
             moved = local.copy()
             moved[:, i] += step
             of_local[i] = slope(self.simulator.run(theta, moved), step)
         return Jacobian(of_theta, of_local)
 
     def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:
-        """Return the size of each parameter, to which the step of its finite difference is proportional."""
-        plant = self.plant
-        sizes = np.maximum(np.abs(theta), 1e-3 * np.max(np.abs(theta[: plant.n_linear]), initial=1e-6))
+        """Return the size of each parameter, to which the step of its finite difference is proportional.
+
+        One that is near zero has a share of what would be its size beside the others', in its own unit.
+        """
+        plant, layout, records = self.plant, self.plant.layout, self.records
+        poles = np.abs(theta[layout.poles])
+        slowest, speed = 1 / records.duration, 1.0
+        natural = np.empty(len(poles))
+        for first in range(0, len(poles), 1 if plant.cascade else 2):
+            section = poles[first : first + (1 if plant.cascade else 2)]  # s + a, or s^2 + a1 s + a0
+            rate = max(slowest, section[0], np.sqrt(section[-1]) if len(section) == 2 else 0.0)
+            natural[first : first + len(section)] = [rate, rate * rate][: len(section)]
+            speed *= rate ** len(section)
+        sizes = np.abs(theta)
+        sizes[layout.poles] = np.maximum(poles, SMALL * natural)
+        inputs = np.repeat(records.input_sizes, len(plant.taps))
+        drives = np.concatenate((sizes[layout.gains] * inputs, sizes[layout.offset]))
+        drive = SMALL * max(np.max(drives), SMALL * speed * self._sizes[0])
+        sizes[layout.gains] = np.maximum(sizes[layout.gains], drive / inputs)
+        sizes[layout.offset] = np.maximum(sizes[layout.offset], drive)
+        sizes[layout.zeros] = np.maximum(sizes[layout.zeros], SMALL * plant.dt ** np.arange(1.0, 1 + plant.zeros))
+        sizes[layout.velocity] = np.maximum(sizes[layout.velocity], SMALL * self._sizes[-1] / self._sizes[0] * plant.dt)
         for term in plant.terms:
             if term in plant.per_experiment:
                 continue
             at = plant.part_of(term)
             starts = [abs(np.array(start.values)) for start in plant.starts_of(term)]
             if starts:
-                sizes[at] = np.maximum(np.abs(theta[at]), 0.1 * np.median(starts, axis=0) + 1e-12)
-        return sizes
+                usual = 0.1 * np.median(starts, axis=0)
+                reach = np.array([p.high - p.low for p in plant.parameters_of(term)])
+                sizes[at] = np.maximum(sizes[at], np.where(usual > 0, usual, SMALL * reach))
+        return np.where(sizes > 0, sizes, SMALL)
 
     def fit(
         self,
@@ -215,12 +243,11 @@ class _OneByOne:
         """Compute the normal equations of these experiments and the gains that they promise."""
         problem = self.problem.only(groups)
         jacobian = problem.jacobian(self.theta, self.local[groups], np.zeros(len(self.theta), dtype=bool))
+        usable = np.max(np.abs(jacobian.local), axis=(0, 2), initial=0.0) < LARGEST_SLOPE  # nor is NaN
+        jacobian = Jacobian(jacobian.theta, np.where(usable[:, None], jacobian.local, 0.0))
         white = problem.noise.whiten(self.errors[groups]).reshape(len(groups), -1)  # [G, M]
         self._groups, self._normal = groups, NormalEquations.of(jacobian, white)
-        usable = np.isfinite(self._normal.blocks).all(axis=(1, 2))
-        promised = np.full(len(groups), np.nan)
-        promised[usable] = self._normal.only(usable).promised_by_each()
-        return promised
+        return np.where(usable, self._normal.promised_by_each(), np.nan)
 
     def attempt(self, groups: np.ndarray, damping: Float[np.ndarray, " G"]) -> Float[np.ndarray, " G"]:
         """Compute the squares of these experiments after damped steps."""

@@ -11,9 +11,9 @@ from jaxtyping import Float
 from simgap.findings import Offer
 from simgap.greybox.fitting import Estimate, Problem
 from simgap.greybox.noise import white
-from simgap.greybox.normal_equations import Jacobian
+from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian
 from simgap.greybox.plant import Plant
-from simgap.greybox.samples import Records
+from simgap.greybox.samples import Records, sizes_of
 from simgap.greybox.simulation import Simulator
 from simgap.records import Channel
 
@@ -42,7 +42,7 @@ class Leftover:
 
 def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     """Regress the errors on what forces of many shapes would do to the output, filtered through the linear plant."""
-    plant, problem = estimate.plant, Problem(estimate.plant, records, white(np.ones(estimate.plant.ny)))
+    plant, problem = estimate.plant, Problem(estimate.plant, records, white(records.sizes))
     n, order = len(records.u), plant.order
     states = problem.simulator.states(estimate.theta[None], estimate.local[None, :, :order])[0]  # [E, T, n]
     names, phi = library(plant, states, records.u)
@@ -63,21 +63,32 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
 def library(plant: Plant, states: np.ndarray, u: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
     """Shapes of a missing force in x, v and the inputs, each scaled to rms 1."""
     x, v = states[..., 0], states[..., min(1, plant.order - 1)]
-    place, rate = np.std(x) + 1e-300, np.std(v) + 1e-300
-    x, v = x / place, v / rate
+    x, v = (signal / sizes_of(signal.reshape(-1, 1))[0] for signal in (x, v))
     shapes = {"x^2": x * x, "x^3": x**3, "v |v|": v * np.abs(v), "sign v": np.tanh(10 * v), "v^3": v**3, "v^2": v * v}
     if plant.order > 1:
         shapes |= {"x v": x * v, "x^2 v": x * x * v, "x |x|": x * np.abs(x)}
     for i in range(u.shape[2]):
-        w = u[..., i] / (np.sqrt(np.mean(u[..., i] ** 2)) + 1e-300)
+        w = u[..., i] / (_rms(u[..., i]) or 1.0)
         name = "u" if u.shape[2] == 1 else f"u{i + 1}"
         shapes |= {f"{name}^2": w * w, f"{name}^3": w**3, f"{name} |{name}|": w * np.abs(w), f"x {name}": x * w,
                    f"x^2 {name}": x * x * w, f"sign {name}": np.tanh(10 * w)}  # fmt: skip
         shapes |= {f"sin(2x) {name}": np.sin(2 * x) * w, f"cos(2x) {name}": np.cos(2 * x) * w}
         before = np.concatenate((w[:, :1], w[:, :-1]), axis=1)
         shapes |= {f"{name} before": before}
-    phi = np.stack([np.nan_to_num(shape) for shape in shapes.values()], axis=2)
-    return tuple(shapes), phi / (np.sqrt(np.mean(phi * phi, axis=(0, 1))) + 1e-300)
+    return tuple(shapes), normalised(np.stack(list(shapes.values()), axis=2))
+
+
+def _rms(values: np.ndarray) -> float:
+    largest = float(np.max(np.abs(values), initial=0.0))
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2))) if largest else 0.0
+
+
+def normalised(columns: Float[np.ndarray, "... f"]) -> Float[np.ndarray, "... f"]:
+    """Scale each column to rms 1; one that is zero, or grows without bound, becomes zero."""
+    kept = np.abs(columns).reshape(-1, columns.shape[-1]).max(axis=0) < LARGEST_SLOPE  # nor is NaN
+    columns = np.where(kept, columns, 0.0)
+    rms = np.array([_rms(columns[..., i]) for i in range(columns.shape[-1])])
+    return columns / np.where(rms > 0, rms, 1.0)
 
 
 def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jacobian: Jacobian) -> float:
@@ -93,9 +104,11 @@ def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jaco
         :, :, 0
     ]
     model = of_theta[mask]  # what the model's own parameters would do
-    features = np.concatenate((model, responses[mask]), axis=1)
-    features = features / (np.sqrt(np.mean(features**2, axis=0)) + 1e-300)
+    if len(np.unique(fold)) < FOLDS:
+        return 0.0  # too few samples to hold any out
+    features = normalised(np.concatenate((model, responses[mask]), axis=1))
     own = model.shape[1]
+    rounding = len(e) * float(records.resolution[0]) ** 2
     shares = []
     best = 0.0
     for ridge in RIDGES:
@@ -110,7 +123,7 @@ def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jaco
             gains.append(np.sum(there**2) - np.sum((there - features[~inside] @ coefficients) ** 2))
             total += np.sum(there**2)
         gains = np.array(gains)
-        shares.append(gains.sum() / max(total, 1e-300))
+        shares.append(gains.sum() / (total + rounding))
         certain = gains.mean() > CERTAIN * gains.std() / np.sqrt(FOLDS - 1)
         if certain:
             best = max(best, float(shares[-1]))
@@ -125,7 +138,7 @@ def formula(leftover: Leftover, channel: Channel) -> Offer:
     """
     from pysindy.optimizers import STLSQ
 
-    responses = leftover.effects / (np.sqrt(np.mean(leftover.effects**2, axis=0)) + 1e-300)
+    responses = normalised(leftover.effects)
     scale = float(np.std(leftover.errors)) or 1.0
     target = (leftover.errors / scale)[:, None]
     tried = []

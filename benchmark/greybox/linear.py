@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.noise import Noise, log_likelihood, white
+from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
-from simgap.greybox.samples import Records, excerpts
+from simgap.greybox.samples import RESOLUTION, Records, excerpts
 from simgap.greybox.score_test import add, candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
 from simgap.records import Channels, Experiment, Kind
@@ -31,21 +32,22 @@ EARLY = 0.25  # samples
 def find_baseline(
     train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int]
 ) -> Baseline:
-    """Fit the plain linear model of one plant to excerpts of the experiments."""
+    """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput."""
+    check_numbers([*train, *valid], channels)
     records = Records.of(excerpts(train), outputs)
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
     kind = channels.outputs[outputs[0]].kind
     models = plain_models(records, held_out, kind)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
-    outliers = [] if stepped else find_outliers(models[-1].errors, records.mask)
+    outliers = [] if stepped else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out), outliers) if valid else records
         models = plain_models(records, held_out, kind)
 
     def baseline_of(plain: Estimate) -> Baseline:
-        problem = Problem(plain.plant, records, white(np.ones(plain.plant.ny)))
+        problem = Problem(plain.plant, records, white(records.sizes))
         plant = replace(plain.plant, scales=scales_of(plain, problem, channels, outputs))
         return Baseline(records, held_out, tuple(outputs), replace(plain, plant=plant), cut, tuple(outliers))
 
@@ -111,13 +113,16 @@ def first_order_hold(held: Estimate, train: Records, valid: Records) -> Estimate
     Seen from held samples, such an input comes half a sample early: the mean time of its gains, zeros included,
     says so. A lag or a delay would make it late.
     """
-    noise = white(np.sqrt(np.mean(held.errors[train.mask] ** 2, axis=0)) + 1e-300)
+    noise = white_as_large_as(held.errors, train.mask, train.resolution)
     smooth = _with_taps(held, train, noise, (0, -1, 1))
     plant, theta = smooth.plant, smooth.theta
-    gains = theta[plant.layout.gains].reshape(plant.nu, -1)
-    early = float(np.sum(gains @ plant.taps * gains.sum(1)) / max(np.sum(gains.sum(1) ** 2), 1e-300))
+    gains = theta[plant.layout.gains].reshape(plant.nu, -1) * train.input_sizes[:, None]
+    gains /= np.max(np.abs(gains)) or 1.0
+    late = np.sum(gains @ plant.taps * gains.sum(1))
+    early = float(late / (np.sum(gains.sum(1) ** 2) or 1.0))
     early += float(np.sum(theta[plant.layout.zeros][:1]) - np.sum(held.theta[held.plant.layout.zeros][:1])) / plant.dt
-    gain = log_likelihood(smooth.errors, train.mask, 1) - log_likelihood(held.errors, train.mask, 1)
+    likely = [log_likelihood(fit.errors, train.mask, 1, train.resolution) for fit in (smooth, held)]
+    gain = likely[0] - likely[1]
     better = block_errors(smooth, valid).mean() < block_errors(held, valid).mean()
     return smooth if early > EARLY and gain > SMOOTH * plant.nu and better else None
 
@@ -137,12 +142,12 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
 def errors_on(fit: Estimate, records: Records) -> np.ndarray:
     """Simulate other records with a fitted model, each from the best initial state: errors [E, T, ny]."""
     fixed = np.ones(fit.plant.size, dtype=bool)
-    return Problem(fit.plant, records, white(np.ones(fit.plant.ny))).fit(fit.theta, fixed=fixed, max_steps=10).errors
+    return Problem(fit.plant, records, white(records.sizes)).fit(fit.theta, fixed=fixed, max_steps=10).errors
 
 
 def block_errors(fit: Estimate, valid: Records) -> np.ndarray:
-    """Average the squared errors of held-out free runs over about twenty blocks."""
-    errors = errors_on(fit, valid)
-    squares = np.where(valid.mask[:, :, None], errors**2, 0.0)
-    blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
+    """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks."""
+    errors = errors_on(fit, valid) / valid.sizes
+    squares = np.where(valid.mask[:, :, None], errors**2 + RESOLUTION**2, 0.0)
+    blocks = np.array_split(squares, min(max(2, BLOCKS // len(squares)), squares.shape[1]), axis=1)
     return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

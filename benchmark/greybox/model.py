@@ -16,7 +16,7 @@ from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
-from simgap.records import Experiment
+from simgap.records import LARGEST_VALUE, Experiment
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,8 @@ class FittedPlant:
         """Simulate rows n_init .. T-1 with what belongs to this experiment alone estimated from all of it."""
         plant, outputs = self.estimate.plant, list(self.outputs)
         y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init][:, :, outputs])[0]
+        if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
+            return y_hat  # it grew without bound, which nothing of this experiment can mend
         error = experiment.y[n_init:, outputs] - y_hat
         t = experiment.dt * np.arange(n_init, len(experiment))
         for j in range(len(outputs)):
@@ -92,7 +94,7 @@ class FittedPlant:
     def log_likelihood(self) -> float:
         """Compute the log-likelihood of the errors as white noise, up to a constant."""
         e = self.estimate.errors[self.records.mask]
-        return float(-0.5 * len(e) * np.sum(np.log(np.mean(e * e, axis=0) + 1e-300)))
+        return float(-0.5 * len(e) * np.sum(np.log(np.mean(e * e, axis=0) + self.records.resolution**2)))
 
 
 @dataclass(eq=False)

@@ -41,6 +41,13 @@ def white(deviations: Float[np.ndarray, " ny"]) -> Noise:
     return Noise(np.ones((len(deviations), 1)), deviations)
 
 
+def white_as_large_as(
+    e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], resolution: Float[np.ndarray, " ny"]
+) -> Noise:
+    """Describe noise without memory as large as these errors, and no smaller than what means anything."""
+    return white(np.maximum(np.sqrt(np.mean(e[mask] ** 2, axis=0)), resolution))
+
+
 def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> Noise:
     """Estimate the noise that errors e would be, by the Yule-Walker equations (Ljung 1999, section 4.2)."""
     ny = e.shape[2]
@@ -49,26 +56,45 @@ def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], orde
     for j in range(ny):
         x = np.where(mask, e[:, :, j], 0.0)
         lags = np.array([np.sum(x[:, lag:] * x[:, : x.shape[1] - lag]) for lag in range(order + 1)])
-        floor = 1e-24 * mask.sum() + 1e-300
-        if order and lags[0] > floor:
+        if order and 0 < lags[0] < np.inf:
             polynomials[j, 1:] = -solve_toeplitz(lags[:-1] * (1 + 1e-9 * (np.arange(order) == 0)), lags[1:])
-        deviations[j] = np.sqrt(max(polynomials[j] @ lags, floor) / mask.sum())
+        if lags[0]:  # noise that its past explains altogether is still noise; errors of zero have any deviation
+            deviations[j] = np.sqrt(max(polynomials[j] @ lags, 1e-12 * lags[0]) / mask.sum())
     return Noise(polynomials, deviations)
 
 
-def schwarz_order(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> int:
-    """Choose the memory of errors e by Schwarz' criterion (Schwarz 1978)."""
-    price = 0.5 * e.shape[2] * math.log(int(mask.sum()))
-    return int(np.argmax([log_likelihood(e, mask, order) - order * price for order in range(MAX_ORDER + 1)]))
+def schwarz_order(
+    e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], resolution: float | np.ndarray = 0.0
+) -> int:
+    """Choose the memory of errors e by Schwarz' criterion (Schwarz 1978), with the same samples for every order."""
+    n = int(mask[:, MAX_ORDER:].sum())
+    if not n:
+        return 0  # records that short tell nothing of a memory
+    price = 0.5 * e.shape[2] * math.log(n)
+    likelihoods = [log_likelihood(e, mask, order, resolution, MAX_ORDER) for order in range(MAX_ORDER + 1)]
+    return int(np.argmax([likelihood - order * price for order, likelihood in enumerate(likelihoods)]))
 
 
-def log_likelihood(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> float:
-    """Compute the log-likelihood of errors e under the noise of that order that suits them best, up to a constant."""
+def log_likelihood(
+    e: Float[np.ndarray, "E T ny"],
+    mask: Bool[np.ndarray, "E T"],
+    order: int,
+    resolution: float | np.ndarray = 0.0,
+    skipped: int | None = None,
+) -> float:
+    """Compute the log-likelihood of errors e under the noise of that order that suits them best, up to a constant.
+
+    The first samples of each record are not counted: `skipped` of them, else as many as the noise remembers. Orders
+    are compared on the same samples only, because the unit of e enters once for every sample. `resolution` is the
+    smallest error of each output that means anything, so that of two perfect fits none is the better one.
+    """
     noise = estimate(e, mask, order)
     if not np.isfinite(noise.deviations).all():
         return -np.inf
     counted = mask.copy()
-    counted[:, :order] = False
+    counted[:, : order if skipped is None else skipped] = False
+    if not counted.any():
+        return 0.0
     w = noise.whiten(e)[counted] * noise.deviations  # [N, ny]
-    variance = np.mean(w * w, axis=0)
-    return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, 1e-300))))
+    variance = np.mean(w * w, axis=0) + np.square(resolution)
+    return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, np.finfo(float).tiny))))

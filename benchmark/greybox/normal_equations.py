@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+LARGEST_SLOPE = 1e100  # its square is still a number
+
 
 @dataclass(frozen=True, eq=False)
 class Jacobian:
@@ -17,8 +19,11 @@ class Jacobian:
 
     @property
     def finite(self) -> bool:
-        """Whether all slopes are numbers."""
-        return bool(np.isfinite(self.theta).all() and np.isfinite(self.local).all())
+        """Whether all slopes are numbers, and their squares too."""
+        return bool(
+            np.max(np.abs(self.theta), initial=0.0) < LARGEST_SLOPE
+            and np.max(np.abs(self.local), initial=0.0) < LARGEST_SLOPE
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,23 +52,24 @@ class NormalEquations:
 
     def steps_of_each(self, damping: float | np.ndarray) -> Float[np.ndarray, "E q"]:
         """Compute the damped steps of the per-experiment numbers, theta being known."""
-        return np.linalg.solve(self._damped(damping), self.block_gradient[:, :, None])[:, :, 0]
+        return self._solved(self.block_gradient[:, :, None], damping)[:, :, 0]
 
     def promised_by_each(self) -> Float[np.ndarray, " E"]:
         """Compute the gain that a whole step of each experiment promises, theta being known."""
         return np.sum(self.steps_of_each(1e-9) * self.block_gradient, axis=1)
 
-    def _damped(self, damping: float | np.ndarray) -> Float[np.ndarray, "E q q"]:
-        blocks, i = self.blocks.copy(), np.arange(self.blocks.shape[1])
-        largest = np.max(blocks, axis=(1, 2), initial=0.0)[:, None]
-        blocks[:, i, i] = blocks[:, i, i] * (1 + np.reshape(damping, (-1, 1))) + 1e-12 * largest + 1e-300
-        return blocks
+    def _solved(self, right: Float[np.ndarray, "E q k"], damping: float | np.ndarray) -> Float[np.ndarray, "E q k"]:
+        """Solve the damped blocks, each number in units of its own slope: then none of them is singular."""
+        i = np.arange(self.blocks.shape[1])
+        scale = scales_of(self.blocks[:, i, i])[:, :, None]  # [E, q, 1]
+        blocks = self.blocks / scale / scale.swapaxes(1, 2)
+        blocks[:, i, i] = 1 + np.reshape(damping, (-1, 1)) + 1e-12
+        return np.linalg.solve(blocks, right / scale) / scale
 
     def reduced(self, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Eliminate the per-experiment numbers: J' J of theta, and what turns steps of theta into theirs."""
-        blocks = self._damped(damping)
-        weights = np.linalg.solve(blocks, self.cross.swapaxes(1, 2))  # [E, q, p]
-        starts = np.linalg.solve(blocks, self.block_gradient[:, :, None])[:, :, 0]  # [E, q]
+        weights = self._solved(self.cross.swapaxes(1, 2), damping)  # [E, q, p]
+        starts = self.steps_of_each(damping)  # [E, q]
         h = self.h - (self.cross @ weights).sum(0)
         return h, weights, starts
 
@@ -71,7 +77,7 @@ class NormalEquations:
         """Compute the damped step of theta and of the per-experiment numbers, and the gain it promises."""
         h, weights, starts = self.reduced(damping)
         gradient = self.gradient - (self.cross @ starts[:, :, None]).sum(0)[:, 0]
-        scale = np.sqrt(np.maximum(np.diag(self.h), 1e-300))
+        scale = scales_of(np.diag(self.h))
         matrix = (h / scale / scale[:, None])[np.ix_(inside, inside)] + (damping + 1e-11) * np.eye(inside.sum())
         step = np.zeros(len(gradient))
         if inside.any():
@@ -79,3 +85,8 @@ class NormalEquations:
         local = starts - weights @ step
         promised = float(step @ gradient + np.sum(starts * self.block_gradient))
         return (step, local), promised
+
+
+def scales_of(diagonal: np.ndarray) -> np.ndarray:
+    """Take the roots of a diagonal of sums of squares; 1 for what moves nothing."""
+    return np.sqrt(np.where(diagonal > 0, diagonal, 1.0))

@@ -29,9 +29,10 @@ class Outliers:
 def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
     """Flag readings whose error stands out from the median of the five around it.
 
-    The errors of a model that is wrong are large for a while; those of a bad reading only once.
+    The errors of a model that is wrong are large for a while; those of a bad reading only once. Beyond the ends of a
+    record its neighbours are mirrored: the last reading repeated would be its own neighbourhood.
     """
-    padded = np.pad(errors, ((0, 0), (2, 2), (0, 0)), mode="edge")
+    padded = np.pad(errors, ((0, 0), (2, 2), (0, 0)), mode="reflect")
     around = np.median(sliding_window_view(padded, 5, axis=1), axis=-1)
     off = np.where(mask[:, :, None], errors - around, 0.0)
     flags = np.zeros(errors.shape, dtype=bool)
@@ -42,9 +43,15 @@ def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> 
     return flags
 
 
-def find_outliers(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
-    """Find outputs with enough readings that are off: log-likelihood of errors of two sizes against one size."""
+def find_outliers(
+    errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], resolution: float | np.ndarray = 0.0
+) -> list[Outliers]:
+    """Find outputs with enough readings that are off: log-likelihood of errors of two sizes against one size.
+
+    `resolution` is the smallest error of each output that means anything.
+    """
     flags = flag(errors, mask)
+    least = np.broadcast_to(resolution, errors.shape[2:])
     outliers = []
     for j in range(errors.shape[2]):
         e, bad = errors[:, :, j][mask], flags[:, :, j][mask]
@@ -52,6 +59,8 @@ def find_outliers(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E
         if count < FEWEST or count > 0.2 * n:
             continue
         one, good, far = np.std(e), np.std(e[~bad]), np.sqrt(np.mean(e[bad] ** 2))
+        if not far > good > 0 or far <= least[j]:
+            continue  # they stand out from their neighbours, but are no larger than the others
         rate = count / n
         ratio = n * np.log(one) - (n - count) * np.log(good / (1 - rate)) - count * np.log(far / rate)
         if ratio > 15:

@@ -11,7 +11,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
+
+# Of poles, per sample.
+FASTEST_TANK = 5.0
+FASTEST = 1e6
 
 
 def plants_of(channels: Channels) -> list[tuple[int, ...]]:
@@ -29,6 +34,12 @@ class PlantScales:
 
     inputs: tuple[SignalScales, ...]
     outputs: tuple[SignalScales, ...]
+
+    @property
+    def output_sizes(self) -> Float[np.ndarray, " ny"]:
+        """Sizes of the outputs, as `Records.sizes` of the readings that the scales were measured on."""
+        sizes = [max(s.y_rms, OFFSET * max(abs(s.y_low), abs(s.y_high))) or 1.0 for s in self.outputs]
+        return np.array(sizes)
 
     def of(self, term: Term) -> SignalScales:
         """Return the scales where a term acts."""
@@ -161,9 +172,10 @@ class Plant:
     def parameters(self) -> tuple[Parameter, ...]:
         """All of theta with bounds; those of the linear plant only as far as stability needs them."""
         inf = float("inf")
-        # A tank that is much faster than the sampling is no tank.
-        fastest = 5 / self.dt if self.cascade else inf
-        linear = [Parameter(f"a{i}", "", 0.0, fastest) for i in range(self.order)]
+        # A tank that is much faster than the sampling is no tank; of anything else, no speed would show.
+        fastest = (FASTEST_TANK if self.cascade else FASTEST) / self.dt
+        squared = [not self.cascade and i % 2 == 1 for i in range(self.order)]  # the a0 of each s^2 + a1 s + a0
+        linear = [Parameter(f"a{i}", "", 0.0, fastest ** (1 + square)) for i, square in enumerate(squared)]
         if self.order == 2 and any(term.effect.replaces_spring for term in self.terms):
             linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
         linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]

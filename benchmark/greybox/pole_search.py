@@ -8,16 +8,17 @@ from itertools import combinations, combinations_with_replacement
 import numpy as np
 
 from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.noise import white
+from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
 from simgap.greybox.samples import Records
 
 FINALISTS = 2
+LARGEST_RATIO = 1e6
 
 
 def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -> Estimate:
     """Fit a plain linear model from the best poles of a grid, or from those of a smaller model and one more."""
-    problem = Problem(plant, records, white(np.std(records.y[records.mask], axis=0) + 1e-12))
+    problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
     tried = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
     linear = np.zeros(plant.size, dtype=bool)
@@ -32,8 +33,8 @@ def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -
     fits = [problem.fit(theta, local) for _, theta, local in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
     # The outputs are weighed by how well they can be simulated.
-    deviations = np.sqrt(np.mean(best.errors[records.mask] ** 2, axis=0)) + 1e-12
-    return Problem(plant, records, white(deviations)).fit(best.theta, best.local)
+    noise = white_as_large_as(best.errors, records.mask, records.resolution)
+    return Problem(plant, records, noise).fit(best.theta, best.local)
 
 
 def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
@@ -60,9 +61,11 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
 
 def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Scale the gains so that the steady gain stays what it was with other poles."""
-    ratio = abs(np.linalg.det(plant.matrix(theta)) / (np.linalg.det(plant.matrix(before)) or 1.0))
+    now, then = (abs(float(np.linalg.det(plant.matrix(values)))) for values in (theta, before))
     if plant.cascade:  # inflow in units of the last tank
-        ratio = theta[plant.order - 1] / (before[plant.order - 1] or 1.0)
+        now, then = float(theta[plant.order - 1]), float(before[plant.order - 1])
+    # An integrator has no steady gain, and what comes near it none that is worth keeping.
+    ratio = min(now / then, LARGEST_RATIO) if then else 1.0
     theta = theta.copy()
     theta[plant.layout.gains] = before[plant.layout.gains] * ratio
     theta[plant.layout.offset] = 0.0

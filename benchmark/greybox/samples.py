@@ -14,6 +14,9 @@ from simgap.records import Experiment
 # The search uses so many samples, spread over the records; the final fit uses all.
 SEARCH_SAMPLES = 5000
 PIECE = 500
+# Of the size of a signal: an error that is smaller is rounding, of a file or of a simulation, and means nothing.
+RESOLUTION = 1e-9
+OFFSET = 1e-3  # the share of a constant reading that counts as its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,21 @@ class Records:
             experiments[0].dt,
         )
 
+    @cached_property
+    def sizes(self) -> Float[np.ndarray, " ny"]:
+        """Sizes of the outputs, in their units."""
+        return sizes_of(self.y[self.mask])
+
+    @cached_property
+    def input_sizes(self) -> Float[np.ndarray, " nu"]:
+        """Sizes of the inputs, in their units."""
+        return sizes_of(self.u[self.mask])
+
+    @property
+    def resolution(self) -> Float[np.ndarray, " ny"]:
+        """The smallest error of each output that means anything."""
+        return RESOLUTION * self.sizes
+
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
         return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt)
@@ -54,10 +72,11 @@ class Records:
         """Number of measured samples of each output."""
         return int(self.mask.sum())
 
-    @cached_property
-    def weights(self) -> Float[np.ndarray, "E T 1"]:
-        """1 where something was measured."""
-        return self.mask[:, :, None].astype(float)
+
+def sizes_of(signals: Float[np.ndarray, "N n"]) -> Float[np.ndarray, " n"]:
+    """Measure the spread of each signal, or a part of its largest value where that is more; 1 where all is zero."""
+    sizes = np.maximum(np.std(signals, axis=0), OFFSET * np.max(np.abs(signals), axis=0))
+    return np.where(sizes > 0, sizes, 1.0)
 
 
 def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> list[Experiment]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.normal_equations import Jacobian, NormalEquations
+from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import refit_from_poles
 from simgap.registry import EFFECTS
@@ -21,7 +21,7 @@ STARTS = 2
 
 
 def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
-    """List every effect that applies to the plant and is not among `terms`, on every channel."""
+    """List every effect that applies to the plant, has where to begin and is not among `terms`, on every channel."""
     plant, scales = baseline.plant, baseline.plant.scales
     assert scales is not None
     taken = {term.key for term in terms}
@@ -33,7 +33,10 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
             continue
         channels = {"input": plant.nu, "force": 1, "output": plant.ny}[effect.port]
         on_channels = [Term(effect, channel) for channel in range(channels)]
-        listed += [t for t in on_channels if t.key not in taken and effect.applies_to(scales.of(t))]
+        listed += [
+            t for t in on_channels
+            if t.key not in taken and effect.applies_to(scales.of(t)) and effect.starts(scales.of(t))
+        ]  # fmt: skip
     return listed
 
 
@@ -49,7 +52,7 @@ def score(
     """
     noise = baseline.noise
     e = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)
-    ee = float(np.vdot(e, e))
+    ee = baseline.problem(estimate.plant).squares(estimate.errors)
     extended = baseline.problem(plant)
     without = baseline.problem(estimate.plant).simulator.run(estimate.theta, estimate.local)
     scored = []
@@ -57,8 +60,10 @@ def score(
         theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
         part, amplitude = plant.part_of(term), start.amplitude
         theta[part] = start.values
-        d = noise.whiten((extended.simulator.run(theta, local) - without) * baseline.train.weights).reshape(e.shape)
-        if not np.isfinite(d).all() or not d.any():
+        with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
+            change = extended.simulator.run(theta, local) - without
+        d = noise.whiten(np.where(baseline.train.mask[:, :, None], change, 0.0)).reshape(e.shape)
+        if not (jacobian.finite and 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE):
             scored.append((0.0, theta, local))
             continue
         _, projected = NormalEquations.of(jacobian, d).step(estimate.plant.free, 1e-9)
@@ -72,7 +77,7 @@ def score(
             parameter = plant.parameters_of(term)[amplitude]
             moved = start.values[amplitude] * along / rest
             theta[part.start + amplitude] = float(np.clip(moved, parameter.low, parameter.high))
-        ratio = max(1 - along * along / (rest * ee), 1e-12)
+        ratio = max(1 - (along / rest) * (along / ee), 1e-12)
         scored.append((-0.5 * baseline.n_errors * math.log(ratio), theta, local))
     return scored
 
@@ -98,7 +103,10 @@ def extend(
 
 
 def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
-    """Fit the model with one effect more, whatever the score test says of it."""
+    """Fit the model with one effect more, whatever the score test says of it; none where it has nowhere to begin."""
+    nothing = any(p.fixed and p.low == p.high == 0 for p in baseline.plant.parameters_of(term))  # a grid of step 0
+    if nothing or not baseline.plant.starts_of(term):
+        return estimate
     extended = extend(baseline, estimate, term)
     if extended is not None:
         return extended

@@ -96,7 +96,7 @@ class _Search:
             trials = compare(self.baseline, trial.estimate, self.noise_order, self.compared, linear_only)
             if trials:
                 best = min(trials, key=lambda trial: trial.estimate.squares).estimate
-                self.noise_order = schwarz_order(best.errors, self.baseline.train.mask)
+                self.noise_order = schwarz_order(best.errors, self.baseline.train.mask, self.baseline.resolution)
                 trial = self._assess(trial.estimate)
                 trials = ranked([self._assess(other.estimate) for other in trials])
             self.rounds.append(Round(trial, tuple(trials)))

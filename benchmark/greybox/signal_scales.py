@@ -25,8 +25,11 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
         records.mask
     ]  # [N, n]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
-    x_max = float(np.max(np.abs(states[:, -1 if plant.cascade else 0])))
-    v_max = float(np.max(np.abs(states[:, min(1, plant.order - 1)])))
+    # What would move the output by its size within the longest record, where the input does nothing.
+    force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (1 if plant.cascade else plant.order)
+    size = float(records.sizes[0])
+    x_max = float(np.max(np.abs(states[:, -1 if plant.cascade else 0]))) or size
+    v_max = float(np.max(np.abs(states[:, min(1, plant.order - 1)]))) or size / records.duration
 
     def scales(i: int, j: int) -> SignalScales:
         u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
@@ -34,8 +37,8 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             kind=plant.kind, order=plant.order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
-            x_max=x_max or 1.0, v_max=v_max or 1.0, stroke=_stroke(plant.order, x_max, v_max, records, states),
-            force_rms=float(np.std(drive)) or 1.0,
+            x_max=x_max, v_max=v_max, stroke=_stroke(plant.order, x_max, v_max, records, states),
+            force_rms=force,
             u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
             lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
@@ -45,11 +48,11 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
 
 def _stroke(order: int, x_max: float, v_max: float, records: Records, states: np.ndarray) -> float:
     if order > 1:
-        return x_max or 1.0
+        return x_max
     # Where only a velocity is measured: its integral between two changes of sign, at most.
     crossings = np.flatnonzero(np.diff(np.sign(states[:, 0])) != 0)
     longest = np.max(np.diff(crossings), initial=10)
-    return (v_max or 1.0) * records.dt * float(min(longest, 200)) * 0.5
+    return v_max * records.dt * float(min(longest, 200)) * 0.5
 
 
 def lines(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:

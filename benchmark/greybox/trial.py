@@ -58,13 +58,14 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     """Score a fitted model on training and on held-out data, under autoregressive noise of the given order."""
     plant, valid = estimate.plant, baseline.valid
     fixed = np.ones(plant.size, dtype=bool)
-    on_valid = Problem(plant, valid, baseline.noise).fit(estimate.theta, fixed=fixed, max_steps=10)
-    squares = np.where(valid.mask[:, :, None], baseline.noise.whiten(on_valid.errors), 0.0) ** 2
+    problem = Problem(plant, valid, baseline.noise)
+    on_valid = problem.fit(estimate.theta, fixed=fixed, max_steps=10)
+    squares = np.where(valid.mask[:, :, None], baseline.noise.whiten(on_valid.errors) ** 2 + problem.least, 0.0)
     blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
     return Trial(
         plant.terms, estimate,
-        log_likelihood(estimate.errors, baseline.train.mask, noise_order),
-        log_likelihood(on_valid.errors, valid.mask, noise_order),
+        log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
+        log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
         int(plant.free.sum()), len(baseline.train.u) * len(plant.per_experiment),
         len(valid.u) * len(plant.per_experiment),
         np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
