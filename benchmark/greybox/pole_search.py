@@ -51,7 +51,8 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
         for start in starts:
             theta = start.copy()
             theta[plant.layout.poles] = shape
-            theta[: plant.n_linear] = _same_gain(plant, start, theta)
+            if not plant.imposed:
+                theta[: plant.n_linear] = _same_gain(plant, start, theta)
             tried.append(problem.fit(theta, fixed=~gains, max_steps=5, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)
     fits = [problem.fit(trial.theta, trial.local) for trial in tried[:FINALISTS]]

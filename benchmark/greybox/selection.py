@@ -15,7 +15,7 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, jacobian_of
-from simgap.greybox.trial import Trial, assess, holds_out, promises, ranked, significant, simulates_as_well
+from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -107,26 +107,10 @@ class _Search:
                 trials = ranked([self._assess(other.estimate) for other in trials])
             self.rounds.append(Round(trial, tuple(trials)))
             better = ranked([other for other in trials if significant(self.baseline, trial, other)])
-            if not better and not linear_only:
-                better = self._pairs(trial, trials)
             if not better:
                 break
             trial = better[0]
         return trial
-
-    def _pairs(self, trial: Trial, trials: Sequence[Trial]) -> list[Trial]:
-        """List pairs of effects that are significant together where no single one is, the best first.
-
-        One of two effects, alone, can halve the errors and yet make each next one harder to forecast: a dead zone
-        without the friction behind it stops in the wrong way. So the one that simulates best is tried with all others.
-        """
-        promising = [other for other in trials if promises(self.baseline, trial, other)]
-        if not promising or len(trial.terms) + 2 > MAX_TERMS:
-            return []
-        first = min(promising, key=lambda other: other.estimate.squares)
-        seconds = compare(self.baseline, first.estimate, self.noise_order, self.compared)
-        tried = [other for other in seconds if len(other.terms) == len(trial.terms) + 2]
-        return ranked([other for other in tried if significant(self.baseline, trial, other, together=2)])
 
     def backward(self, trial: Trial) -> Trial:
         """Take out, one by one, the effects that no longer pass alone against the rest; those that stay do."""
@@ -146,7 +130,7 @@ class _Search:
             rest = self._without(trial, term)
             trials = compare(self.baseline, rest.estimate, self.noise_order, self.compared)
             trials = ranked([other for other in trials if significant(self.baseline, rest, other)])
-            if trials and trials[0].score > trial.score + BETTER and not simulates_as_well(trial, trials[0]):
+            if trials and trials[0].score > trial.score + BETTER:
                 trial = self.backward(trials[0])
         return trial
 

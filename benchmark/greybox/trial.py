@@ -23,11 +23,10 @@ HELD_OUT = 3.0
 # The mean gain of the held-out blocks over its standard error: one in ten by chance.
 CONSISTENT = 1.3
 BLOCKS = 20
+WORST = 10.0  # times the squares of the mean model: what the error of a held-out block counts at most
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
 MATTERS_AT_ALL = 0.003  # of what the plain model has
-# Share of the squared error that an effect must take to be tried together with others.
-PROMISING = 0.2
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
 
@@ -81,16 +80,16 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     )  # fmt: skip
 
 
-def significant(baseline: Baseline, smaller: Trial, larger: Trial, together: int = 1) -> bool:
+def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
 
-    2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried, when
-    so many effects are added together. L is that of one-step errors, or of free runs: an effect may take most of what
-    is wrong in the long run and leave the next sample as hard to forecast as it was.
+    2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried. L is
+    that of one-step errors, or of free runs: an effect may take most of what is wrong in the long run and leave the
+    next sample as hard to forecast as it was.
     """
     ratio = max(larger.train - smaller.train, free_run_ratio(baseline, smaller, larger))
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
-    tried = (len(candidates(baseline, smaller.terms)) * STARTS) ** together
+    tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
     gain = smaller.estimate.squares - larger.estimate.squares
     matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.squares
@@ -113,37 +112,26 @@ def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
     return ratio
 
 
-def promises(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
-    """Tell whether the larger model simulates much better, in training and in held-out data, whatever it forecasts."""
-    less = larger.estimate.squares < (1 - PROMISING) * smaller.estimate.squares
-    return less and larger.k_valid == smaller.k_valid and holds_out(baseline, smaller, larger)
-
-
 def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether the larger model simulates held-out data better, in most of them."""
     if larger.k_valid > smaller.k_valid:
         # Estimated anew there, so the gain must pay for that.
         price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.mask.shape[1])
         return larger.valid - smaller.valid - price > HELD_OUT
-    gain = smaller.blocks - larger.blocks
+    # One simulation that grows without bound must not outweigh all other blocks.
+    most = WORST * baseline.squares_of_mean / len(smaller.blocks)
+    gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     return bool(gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain)))
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:
-    """Sort trials, the best first; but a simpler one that simulates as well comes before it."""
+    """Sort trials, the best first; but of those that fit alike, the one with the fewest parameters."""
     best_first = sorted(trials, key=lambda trial: -trial.score)
     if not best_first:
         return []
     best = best_first[0]
-    first = min((trial for trial in best_first if simulates_as_well(trial, best)), key=lambda trial: trial.cost)
-    if first.cost == best.cost:
+    alike = [trial for trial in best_first if trial.estimate.squares < (1 + ALIKE) * best.estimate.squares]
+    simplest = min(alike, key=lambda trial: trial.cost)
+    if simplest.cost == best.cost:
         return best_first
-    return [first, *(trial for trial in best_first if trial is not first)]
-
-
-def simulates_as_well(one: Trial, other: Trial) -> bool:
-    """Tell whether one model fits like another, or is at most a standard error worse in held-out simulations."""
-    if one.estimate.squares < (1 + ALIKE) * other.estimate.squares:
-        return True
-    worse = one.blocks - other.blocks
-    return bool(worse.mean() <= worse.std() / math.sqrt(len(worse)))
+    return [simplest, *(trial for trial in best_first if trial is not simplest)]
