@@ -61,12 +61,12 @@ def diagnose(
     after = [model.simulate_anew(x, dataset.n_init) for x in dataset.test]
     evidence = [Evidence(one, dataset.channels) for one in identified]
     doubt = _doubt(evidence, dataset)
-    causes = () if doubt else _causes(evidence, profiles)
+    # A search that was stopped at the largest number of effects might have gone on: none of them is the explanation.
+    endless = any(len(plant.selection.trial.terms) >= MAX_TERMS for plant in evidence)
+    causes = () if doubt or endless else _causes(evidence, profiles)
     left, offers = _left(evidence, dataset)
     explained = min((plant.explained for plant in evidence), default=0.0) if causes else 0.0
     verdict: Verdict = "named" if causes else "nothing_found"
-    # A search that was stopped at the largest number of effects might have gone on: none of them is the explanation.
-    endless = any(len(plant.selection.trial.terms) >= MAX_TERMS for plant in evidence)
     if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
         verdict, causes = "unexplained", ()
     if not causes:

@@ -49,16 +49,20 @@ class Selection:
     noise_order: int
     rounds: tuple[Round, ...]
     compared: Compared
+    parts: dict[frozenset[tuple[str, int]], Trial] = field(default_factory=dict)  # with some of the chosen effects only
 
     def only(self, terms: Sequence[Term]) -> Trial:
-        """Fit some of the chosen effects again without the others."""
+        """Fit some of the chosen effects again without the others; each choice is fitted once."""
         if len(terms) == len(self.trial.terms):
             return self.trial
-        return only(self.baseline, self.trial, terms, self.noise_order)
+        key = frozenset(term.key for term in terms)
+        if key not in self.parts:
+            self.parts[key] = only(self.baseline, self.trial, terms, self.noise_order)
+        return self.parts[key]
 
     def without(self, term: Term) -> Trial:
         """Fit the chosen model again with one term less."""
-        return without(self.baseline, self.trial, term, self.noise_order)
+        return self.only([other for other in self.trial.terms if other != term])
 
     def compare(self, trial: Trial) -> list[Trial]:
         """Fit and assess a model with each candidate added; what the selection has compared is not fitted again."""
