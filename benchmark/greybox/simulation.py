@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import inspect
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from jaxtyping import Float
 from numba import cfunc
 
-from simgap.greybox.effects.effect import InputEffect, OutputEffect
-from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_plant_directly, transition
+from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
+from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body_directly, run_tanks_directly, transition
 from simgap.greybox.plant import Plant
 
-ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3, "stop": 4}
+ROLES = get_args(Role)  # as the kernels number them
 
 
 @cache
@@ -49,14 +49,13 @@ class Simulator:
         self._u = np.ascontiguousarray(arriving)
         self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
-        forces = plant.forces
+        forces = sorted(plant.forces, key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
         acting: list[Any] = [term.effect for term in forces]
         unused = SLOTS - len(forces)
         self._terms = tuple(compiled(effect.term) for effect in acting) + (compiled(nothing),) * unused
-        self._n_terms = len(forces)
-        self._roles = np.array([ROLES[effect.role] for effect in acting] + [0] * unused)
+        self._until = np.searchsorted([ROLES.index(effect.role) for effect in acting], range(len(ROLES)), side="right")
         self._p_at = np.array([plant.part_of(term).start for term in forces] + [0] * unused)
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory, *([memory[-1]] * unused)])  # one more: where the last one's memory ends
@@ -82,11 +81,11 @@ class Simulator:
             transition(a, self.h, e[i], g0[i], g1[i])
             rates[i] = -np.diag(a) if plant.cascade else -a[-1]
         states = np.empty((s, experiments, samples, n))
-        entry, fast = (0, 0) if plant.cascade else (n - 1, min(1, n - 1))
-        run_plant_directly(
-            e, g0, g1, rates, entry, fast, np.stack([self.drive(theta) for theta in thetas]),
-            np.ascontiguousarray(starts), self.substeps, self.h, self._terms, self._n_terms, self._roles,
-            np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
+        run = run_tanks_directly if plant.cascade else run_body_directly
+        run(
+            e, g0, g1, rates, np.stack([self.drive(theta) for theta in thetas]), np.ascontiguousarray(starts),
+            self.substeps, self.h, self._terms, self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at,
+            self._memory, states,
         )  # fmt: skip
         return states
 
@@ -97,8 +96,8 @@ class Simulator:
         begun[:, self._remembered] = start[:, start.shape[1] - len(self._remembered) :]
         drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
         follow_motion(
-            drive, motion, self.h, self._terms, self._n_terms, self._roles, np.ascontiguousarray(theta), self._p_at,
-            self._m_at, begun, self._memory, states,
+            drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
+            self._memory, states,
         )  # fmt: skip
         return states
 
