@@ -16,6 +16,8 @@ from simgap.greybox.plant import Plant, Term
 from simgap.greybox.samples import Records
 
 MAX_STEPS = 40
+# Of the variance of the errors: what a fit of the search may leave to gain. It moves no comparison of two models.
+TOLERANCE = 0.1
 ENOUGH_EXPERIMENTS = 3
 
 
@@ -77,4 +79,7 @@ class Baseline:
     ) -> Estimate:
         """Fit a set of terms from several starts and return the best."""
         problem = self.problem(self.plant.having(terms))
-        return min((problem.fit(*start, max_steps=max_steps) for start in starts), key=lambda fit: fit.squares)
+        return min(
+            (problem.fit(*start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
+            key=lambda fit: fit.squares,
+        )

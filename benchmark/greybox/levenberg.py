@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 MOST_DAMPED = 1e10
+SHORT_STEPS = 3
 
 
 @runtime_checkable
@@ -34,15 +35,18 @@ def minimise(descent: Descent, max_steps: int, tolerance: float) -> Bool[np.ndar
     """Minimise the squares of every group, and tell which converged (Marquardt 1963; Ljung 1999, section 10.2).
 
     A group has converged when the quadratic model promises less than `tolerance` of the variance of its errors, when
-    the last step gained a millionth of that, or when no step downhill is left in floating point.
+    three steps in a row gained less than that, the last one a millionth of it, or when no step downhill is left in
+    floating point.
     """
     damping, converged = np.full(len(descent.squares), 1e-3), np.zeros(len(descent.squares), dtype=bool)
+    short = np.zeros(len(descent.squares), dtype=int)  # steps in a row that gained next to nothing
     active = np.flatnonzero(np.isfinite(descent.squares))
     for _ in range(max_steps):
         if not len(active):
             break
         promised = descent.linearise(active)
-        worth = promised > tolerance * descent.squares[active] / np.maximum(1, descent.samples[active])
+        least = tolerance * descent.squares / np.maximum(1, descent.samples)
+        worth = promised > least[active]
         converged[active[~worth & np.isfinite(promised)]] = True
         active = active[worth]
         moved, trying = np.zeros(len(active), dtype=bool), np.arange(len(active))
@@ -52,10 +56,13 @@ def minimise(descent: Descent, max_steps: int, tolerance: float) -> Bool[np.ndar
             better = now < before
             good, bad = groups[better], groups[~better]
             descent.accept(good, now[better])
-            moved[trying[better]] = before[better] - now[better] >= 1e-6 * tolerance * before[better]
+            gained = before[better] - now[better]
+            moved[trying[better]] = gained >= 1e-6 * tolerance * before[better]
+            short[good] = np.where(gained < least[good], short[good] + 1, 0)
             damping[good] = np.maximum(damping[good] / 10, 1e-12)
             damping[bad] = np.maximum(damping[bad] * 6, 1e-6)
             trying = trying[~better][damping[bad] < MOST_DAMPED]
+        moved &= short[active] < SHORT_STEPS
         converged[active[~moved]] = True
         active = active[moved]
     return converged

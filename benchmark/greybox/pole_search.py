@@ -37,7 +37,7 @@ def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -
     return Problem(plant, records, noise).fit(best.theta, best.local)
 
 
-def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
+def refit_from_poles(problem: Problem, starts: list[np.ndarray], tolerance: float) -> Estimate:
     """Fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept."""
     plant, records = problem.plant, problem.records
     gains = np.zeros(plant.size, dtype=bool)
@@ -53,9 +53,9 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray]) -> Estimate:
             theta[plant.layout.poles] = shape
             if not plant.imposed:
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
-            tried.append(problem.fit(theta, fixed=~gains, max_steps=5, tolerance=1.0))
+            tried.append(problem.fit(theta, fixed=~gains, max_steps=2, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)
-    fits = [problem.fit(trial.theta, trial.local) for trial in tried[:FINALISTS]]
+    fits = [problem.fit(trial.theta, trial.local, tolerance=tolerance) for trial in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
     return problem.fit(best.theta, best.local) if plant.sign_hidden else best
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simgap.greybox.baseline import MAX_STEPS, Baseline
+from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant, Term
@@ -94,7 +94,7 @@ def extend(
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
     if term.effect.moves_poles:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
-        return refit_from_poles(baseline.problem(plant), thetas)
+        return refit_from_poles(baseline.problem(plant), thetas, TOLERANCE)
     jacobian = jacobian or jacobian_of(baseline, estimate)
     scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
     if not scored or scored[0][0] < WORTH_A_REFIT:

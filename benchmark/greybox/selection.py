@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numba
 
-from simgap.greybox.baseline import Baseline
+from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
@@ -28,6 +28,7 @@ MAX_TERMS = 5
 # Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
+MORE_STEPS = 8  # until they are compared again
 
 Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
 
@@ -188,17 +189,34 @@ def compare(
     def begin(term: Term) -> Estimate | None:
         return extend(baseline, estimate, term, jacobian, FEW_STEPS)
 
-    def finish(fit: Estimate) -> Trial:
-        hopeless = 0.5 * baseline.n_errors * math.log(before / fit.squares) < WORTH_A_REFIT
-        if not fit.converged and (not hopeless or fit.plant.per_experiment):
-            fit = baseline.fit(fit.plant.terms, [(fit.theta, fit.local)])
-        return assess(baseline, fit, noise_order)
+    def worth(fit: Estimate) -> bool:
+        gained = 0.5 * baseline.n_errors * math.log(before / fit.squares)
+        return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    compared[key] = tuple(in_threads(finish, begun[:FINALISTS]))
+    finalists = _race(baseline, begun[:FINALISTS], worth)
+    compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
+
+
+def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:
+    """Go on with fits until all have converged but those that are behind the best by more than their last gain."""
+
+    def go_on(fit: Estimate) -> Estimate:
+        return baseline.fit(fit.plant.terms, [(fit.theta, fit.local)], MORE_STEPS)
+
+    fits, gains = list(fits), [math.inf] * len(fits)
+    for _ in range(MAX_STEPS // MORE_STEPS):
+        costs = [_cost(baseline, fit) for fit in fits]
+        running = [
+            i for i, fit in enumerate(fits)
+            if not fit.converged and worth(fit) and costs[i] - min(costs) <= gains[i]
+        ]  # fmt: skip
+        for i, fit in zip(running, in_threads(go_on, [fits[i] for i in running]), strict=True):
+            fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
+    return fits
 
 
 def _cost(baseline: Baseline, fit: Estimate) -> float:
