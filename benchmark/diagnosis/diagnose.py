@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from simgap.diagnosis import checks, doubts, gains
+from simgap.diagnosis import checks, doubts, gains, promises
 from simgap.diagnosis.answer import Diagnosis
 from simgap.error_views.views import views
-from simgap.findings import Cause, Findings, Offer, Trace, Verdict, Wrong
+from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
-from simgap.greybox.selection import MAX_TERMS
 from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset
 
@@ -55,35 +54,30 @@ def diagnose(
     dataset = with_kinds(dataset, kind)
     check_numbers(dataset.test, dataset.channels)
     identified = identify(dataset.training)
-    model = GreyBoxModel([one.plant for one in identified])
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
-    after = [model.simulate_anew(x, dataset.n_init) for x in dataset.test]
     evidence = [Evidence(one, dataset.channels) for one in identified]
     doubt = _doubt(evidence, dataset)
-    # A search that was stopped at the largest number of effects might have gone on: none of them is the explanation.
-    endless = any(len(plant.selection.trial.terms) >= MAX_TERMS for plant in evidence)
-    causes = () if doubt or endless else _causes(evidence, profiles)
     left, offers = _left(evidence, dataset)
-    explained = min((plant.explained for plant in evidence), default=0.0) if causes else 0.0
-    verdict: Verdict = "named" if causes else "nothing_found"
+    trusted = [plant for plant in map(promises.rests_on, evidence) if plant]
+    endless = len(trusted) < len(evidence)
+    found = any(plant.found for plant in trusted)
+    explained = min(plant.explained for plant in evidence) if found and not endless else 0.0
+    verdict: Verdict = "nothing_found"
+    promised = None
     if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
-        verdict, causes = "unexplained", ()
-    if not causes:
-        after = before
-    gain = gains.measure(dataset, before, after)
-    suspects: tuple[Cause, ...] = ()
-    # The test split may withdraw a name. It never chooses another, and nothing is fitted after it was read.
-    if verdict == "named" and gain.low <= 0:
-        verdict, causes, suspects = "suspected", (), causes
+        verdict = "unexplained"
+    elif found and not doubt:
+        promised = promises.promise(trusted, dataset, before, profiles)
+        verdict = "named" if promised.causes else "suspected"
     findings = Findings(
         dataset=dataset.name,
         verdict=verdict,
         baseline=_baseline(plain, dataset, before),
         wrong=_wrong(plain, dataset, seed) if views_too else (),
-        causes=causes,
-        runner_up=_runner_up(evidence) if causes or suspects else None,
-        gain=gain,
+        causes=promised.causes if promised else (),
+        runner_up=_runner_up(trusted) if promised else None,
+        gain=promised.gain if promised else gains.measure(dataset, before, before),
         seconds=0.0,
         units={channel.name: channel.unit for channel in dataset.channels.outputs},
         inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
@@ -92,10 +86,11 @@ def diagnose(
         checks=checks.look(dataset),
         left=left,
         offers=offers if verdict == "unexplained" else (),
-        traces=_traces(dataset, before, after),
+        traces=_traces(dataset, before, promised.after if promised else before),
         seed=seed,
-        suspects=suspects,
+        suspects=promised.suspects if promised else (),
     )
+    model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     return Diagnosis(findings, time.perf_counter() - begin, model)
 
 
@@ -105,12 +100,6 @@ def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
     said = [doubts.shows_controller((*training.train, *training.valid), dataset.channels)]
     said += [doubts.beaten_by_mean(plant.selection, dataset.channels) for plant in evidence]
     return tuple(sentence for sentence in said if sentence)
-
-
-def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
-    """List the named effects of all plants, those of the plant that they explain best first."""
-    plants = sorted(evidence, key=lambda plant: -plant.explained)
-    return tuple(cause for plant in plants for cause in plant.causes(profiles))
 
 
 def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:

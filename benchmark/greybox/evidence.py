@@ -57,6 +57,21 @@ class Evidence:
         """Share of the plain model's squared error in training that the effects explain together."""
         return 1 - self.selection.trial.estimate.squares / self.selection.baseline.squares
 
+    @property
+    def found(self) -> bool:
+        """Whether there is any effect, bad readings among them."""
+        return bool(self.terms or self.selection.baseline.outliers)
+
+    @property
+    def terms(self) -> list[Term]:
+        """The effects in the order of what they explain."""
+        return [term for term, _ in self._in_order]
+
+    @property
+    def shares(self) -> list[float]:
+        """Share of the plain model's squared error in training that each takes, on top of those before it."""
+        return [share for _, share in self._in_order]
+
     @cached_property
     def _in_order(self) -> list[tuple[Term, float]]:
         """Every effect with the share of the error that it takes on top of those before it.

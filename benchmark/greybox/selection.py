@@ -128,8 +128,11 @@ class _Search:
         return trial
 
     def exchange(self, trial: Trial) -> Trial:
-        """Try every other effect in the place of each, because the first choice was made without the others."""
-        for term in trial.terms if len(trial.terms) > 1 else ():
+        """Try every other effect in the place of each, because the first choice was made without the others.
+
+        Where the search ran into the largest number of effects, no exchange makes them the explanation.
+        """
+        for term in trial.terms if 1 < len(trial.terms) < MAX_TERMS else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
             rest = self._without(trial, term)
