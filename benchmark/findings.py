@@ -169,7 +169,7 @@ class Offer:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """The answer of `simgap.diagnose` about one data set; suspects stand in the place of causes, never beside them."""
+    """The answer of `simgap.diagnose` about one data set; what the test data do not confirm is suspected."""
 
     dataset: str
     verdict: Verdict
@@ -188,7 +188,7 @@ class Findings:
     offers: tuple[Offer, ...] = ()
     traces: tuple[Trace, ...] = ()
     seed: int = 0
-    suspects: tuple[Cause, ...] = ()
+    suspects: tuple[Cause, ...] = ()  # in the place of causes, or beside them
 
     @property
     def effects(self) -> tuple[Cause, ...]:

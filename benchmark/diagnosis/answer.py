@@ -11,9 +11,9 @@ from simgap.greybox.model import GreyBoxModel
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found, as a text, a page or JSON; `model` is `greybox-auto`, which never saw the test split.
+    """What was found, as a text, a page or JSON; `model` simulates with the causes or, without any, with the suspects.
 
-    It simulates with the causes, and with the suspects too.
+    It is `greybox-auto`, fitted without the test split, less the effects that the test split did not confirm.
     """
 
     findings: Findings

@@ -37,7 +37,7 @@ class _Plots:
 
 
 def diagnosis_page(findings: Findings) -> str:
-    """Write the whole answer: headline, gain, experiments, causes or suspects, what else the simulation gets wrong.
+    """Write the whole answer: headline, gain, experiments, causes and suspects, what else the simulation gets wrong.
 
     Whatever comes from a data set is text there: it is escaped, in plots too, and the page may load nothing.
     """
@@ -56,7 +56,11 @@ def diagnosis_page(findings: Findings) -> str:
         "wording": wording,
         "words": words,
         "traces": _traces(findings, plots),
-        "causes": [_cause(cause, findings, plots, shown) for cause in findings.effects],
+        "causes": [
+            _cause(cause, findings, plots, shown) | {"called": f"{called} {i} of {len(causes)}"}
+            for called, causes in (("Cause", findings.causes), ("Suspect", findings.suspects))
+            for i, cause in enumerate(causes, start=1)
+        ],
     }
     rest = [view for view in words.beyond_chance(findings) if id(view) not in shown]
     content["views"] = [(view, _view(view, findings, plots)) for view in rest]

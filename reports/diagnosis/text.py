@@ -23,14 +23,14 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         *_section("Plain linear model", _baseline(findings), width),
         *_section("What it gets wrong", _wrong(findings), width),
     ]
-    called = "Suspect" if findings.verdict == "suspected" else "Cause"
-    for i, cause in enumerate(findings.effects, start=1):
-        title = f"{called} {i}: {words.cause_title(cause, findings)}"
-        paragraphs += _section(title, _cause(cause, findings), width)
+    for called, causes in (("Cause", findings.causes), ("Suspect", findings.suspects)):
+        for i, cause in enumerate(causes, start=1):
+            title = f"{called} {i}: {words.cause_title(cause, findings)}"
+            paragraphs += _section(title, _cause(cause, findings), width)
     if second := words.runner_up(findings):
         paragraphs += _section("Runner-up", [second], width)
     if findings.effects:
-        title = "Free-run RMSE on the test experiments" + (", with the suspects" if findings.suspects else "")
+        title = "Free-run RMSE on the test experiments" + (", with the suspects" if not findings.causes else "")
         paragraphs += _section(title, _gain(findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"

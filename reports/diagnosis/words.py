@@ -28,21 +28,28 @@ def headline(findings: Findings) -> str:
             "Something is there, but nothing in the catalogue explains it: "
             f"{percent(findings.left)} of the squared error could still be predicted from the input."
         )
-    names = [cause_title(cause, findings) for cause in findings.effects]
-    listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-    them = "it" if len(names) == 1 else "them"
+    listed, several = _listed(findings.effects, findings), len(findings.effects) > 1
+    them = "them" if several else "it"
     if math.isfinite(gain.share):
         change = f"{'falls' if gain.share >= 0 else 'rises'} by {percent(abs(gain.share))}{_range(findings)}"
     else:
         change = "cannot be compared, because a simulation diverges"
     if findings.verdict == "suspected":
-        helps = "it helps" if len(names) == 1 else "they help"
+        helps = "they help" if several else "it helps"
         says = f"speak against {them}" if gain.high < 0 else f"do not show that {helps}"
         return (
             f"Suspected, not shown: {listed}. The training data ask for {them}, but the test experiments {says}: "
             f"with {them} the free-run error {change}."
         )
-    return f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments {change}."
+    said = f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments {change}."
+    if not findings.suspects:
+        return said
+    return f"{said} Suspected besides, not shown: {_listed(findings.suspects, findings)}."
+
+
+def _listed(causes: Sequence[Cause], findings: Findings) -> str:
+    names = [cause_title(cause, findings) for cause in causes]
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def cause_title(cause: Cause, findings: Findings) -> str:
@@ -71,7 +78,7 @@ def evidence(cause: Cause) -> str:
 
 def deciding(cause: Cause, findings: Findings) -> str:
     """Say what to record to decide about a suspect; empty for a cause, and where its confounders say it already."""
-    if findings.verdict != "suspected" or cause.confounded_with or not cause.deciding_experiment:
+    if cause not in findings.suspects or cause.confounded_with or not cause.deciding_experiment:
         return ""
     return f"To decide: {cause.deciding_experiment.rstrip('.')}."
 

@@ -184,3 +184,11 @@ def test_an_estimate_has_the_digits_that_its_interval_deserves(estimate, shown):
 
 def test_a_parameter_that_was_not_estimated_has_no_interval():
     assert interval(Value("mid level", "V", 6.5, 6.5, 6.5)) == "read off the data, not estimated"
+
+
+def test_suspects_beside_a_cause_are_said_after_it(named):
+    suspect = replace(named.causes[0], title="backlash", confounded_with=(), deciding_experiment="Push it slowly.")
+    text = in_one_line(diagnosis_text(replace(named, suspects=(suspect,))))
+    assert "Suspected besides, not shown: backlash." in text
+    assert text.index("Cause 1: Coulomb friction") < text.index("Suspect 1: backlash") < text.index("To decide: Push")
+    assert "with the suspects" not in text

@@ -1,0 +1,93 @@
+"""What a search found, held against test data: which of its effects are named, and which are only suspected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from simgap.diagnosis import gains
+from simgap.findings import Cause, Gain
+from simgap.greybox.evidence import Evidence
+from simgap.greybox.identification import Identified
+from simgap.greybox.model import FittedPlant, GreyBoxModel
+from simgap.greybox.plant import Term
+from simgap.greybox.selection import MAX_TERMS
+from simgap.records import Dataset
+
+# Of what a search that did not end by itself takes of the error: the least that the effects it rests on must take.
+MOST = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """Effects that are named, effects that are suspected, and the model with the former or, without any, the latter."""
+
+    causes: tuple[Cause, ...]
+    suspects: tuple[Cause, ...]
+    model: GreyBoxModel
+    after: tuple[np.ndarray, ...]  # its simulation of the test experiments
+    gain: Gain
+
+
+def trusted(shares: Sequence[float]) -> int:
+    """Count the effects that a search rests on, by the share of the error that each takes on top of those before it.
+
+    A search that was stopped at the largest number of effects might have gone on. It is trusted where less than half
+    of them take nearly all of the error that it takes; the others may stand for anything.
+    """
+    if len(shares) < MAX_TERMS:
+        return len(shares)
+    taken = np.cumsum(shares)
+    enough = 1 + int(np.argmax(taken >= MOST * taken[-1]))
+    return enough if enough < MAX_TERMS / 2 else 0
+
+
+def rests_on(plant: Evidence) -> Evidence | None:
+    """Return the evidence with those effects only that the search rests on; None where it rests on none it found."""
+    count = trusted(plant.shares)
+    return _only(plant, plant.terms[:count]) if count or not plant.terms else None
+
+
+def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.ndarray], profiles: bool) -> Promise:
+    """Withdraw effects, the last first, until the test experiments confirm the gain of those that are left.
+
+    Where they confirm none, all are suspected. The order was fixed in training; the test data choose no other effect.
+    `before` is the plain model's simulation of the test experiments.
+    """
+    listed = [(plant, term) for plant in _in_order(evidence) for term in plant.terms]
+    least = 0 if any(plant.selection.baseline.outliers for plant in evidence) else 1
+    found = _causes(evidence, profiles)
+    for count in range(len(listed), least - 1, -1):
+        kept = [_only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
+        model = GreyBoxModel([plant.identified.plant for plant in kept])
+        after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
+        gain = gains.measure(dataset, before, after)
+        if count == len(listed):
+            suspected = Promise((), found, model, after, gain)
+        if gain.low > 0:
+            causes = found if count == len(listed) else _causes(kept, profiles)
+            named = {(cause.effect, cause.channel) for cause in causes}
+            rest = tuple(cause for cause in found if (cause.effect, cause.channel) not in named)
+            return Promise(causes, rest, model, after, gain)
+    return suspected
+
+
+def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:
+    """Sort the plants, the one that its effects explain best first."""
+    return sorted(evidence, key=lambda plant: -plant.explained)
+
+
+def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
+    return tuple(cause for plant in _in_order(evidence) for cause in plant.causes(profiles))
+
+
+def _only(plant: Evidence, terms: Sequence[Term]) -> Evidence:
+    """Return the evidence about the same plant with some of its effects only, fitted to all training data again."""
+    selection = plant.selection
+    if len(terms) == len(selection.trial.terms):
+        return plant
+    trial = selection.only(terms)
+    smaller = FittedPlant.fit(trial.estimate, selection.baseline, plant.identified.plant.experiments)
+    return replace(plant, identified=Identified(replace(selection, trial=trial), smaller))
