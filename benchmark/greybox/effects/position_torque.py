@@ -51,7 +51,7 @@ class PositionTorque(ForceEffect):
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the simulation has a position."""
-        return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
+        return scales.kind == "position"
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
