@@ -1,4 +1,4 @@
-"""The contract of a model (design, section 2) as checks that say in words what is wrong."""
+"""The contract of a model as checks that say in words what is wrong."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from simgap.records import Dataset
 SHORT = 200  # training samples; with fewer, weak effects do not stand out from noise
 
 
-def look(dataset: Dataset) -> tuple[str, ...]:
+def limitations(dataset: Dataset) -> tuple[str, ...]:
     """Check the training data; return a sentence for whatever limits what a diagnosis can find in them."""
     training = dataset.training
     sentences = []

@@ -83,7 +83,7 @@ def diagnose(
         inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
         doubts=doubt,
-        checks=checks.look(dataset),
+        checks=checks.limitations(dataset),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, promised.after if promised else before),

@@ -39,6 +39,15 @@ def test_gaussian_noise_has_no_outliers():
     assert outliers_found(errors(rate=0.0)[0], EVERYWHERE) == []
 
 
+@pytest.mark.parametrize("freedom", [1.8, 2.5])
+def test_noise_with_heavy_tails_has_no_outliers(freedom):
+    """Large errors are rare there too, but nothing sets them apart from the others."""
+    for seed in range(10):
+        e = np.random.default_rng(seed).standard_t(freedom, (*SHAPE, 1))
+        assert outliers_flagged(e, EVERYWHERE).sum() > 20
+        assert outliers_found(e, EVERYWHERE) == []
+
+
 def test_a_model_that_is_wrong_for_a_while_has_no_outliers():
     e, _ = errors(rate=0.0)
     e[1, 100:140] += 20.0
