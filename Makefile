@@ -21,7 +21,7 @@ INSTALLED := $(VENV)/installed-$(VERSION)
 
 help:
 	@echo "make benchmark   all models on all data sets at hand, as tables in the terminal and in results/"
-	@echo "make test        the tests; make test-slow for those that take minutes, with make peers"
+	@echo "make test        the tests; make test-slow for those that take minutes, after make peers with SIPPY"
 	@echo "make lint        format, style and types; make dev sets up .venv and stops"
 	@echo "make speed       times beside those of other tools, with make peers"
 	@echo "make peers       those other tools into .venv"
@@ -54,8 +54,8 @@ test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
 	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
 
-test-slow: peers
-	@$(BIN)/python -m pytest -q -m slow
+test-slow: $(INSTALLED)
+	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow --numprocesses $(JOBS) --dist worksteal
 
 # After an interruption, or with one more model, only what is not in results/ yet is run. A failed job (1) is a row of
 # the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.

@@ -44,7 +44,7 @@ def test_noise_with_heavy_tails_has_no_outliers(freedom):
     """Large errors are rare there too, but nothing sets them apart from the others."""
     for seed in range(10):
         e = np.random.default_rng(seed).standard_t(freedom, (*SHAPE, 1))
-        assert outliers_flagged(e, EVERYWHERE).sum() > 20
+        assert outliers_flagged(e, EVERYWHERE).sum() >= 10
         assert outliers_found(e, EVERYWHERE) == []
 
 
