@@ -37,7 +37,7 @@ def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -
     return Problem(plant, records, noise).fit(best.theta, best.local)
 
 
-def refit_from_poles(problem: Problem, starts: list[np.ndarray], tolerance: float) -> Estimate:
+def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int, tolerance: float) -> Estimate:
     """Fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept."""
     plant, records = problem.plant, problem.records
     gains = np.zeros(plant.size, dtype=bool)
@@ -55,7 +55,7 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], tolerance: floa
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
             tried.append(problem.fit(theta, fixed=~gains, max_steps=2, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)
-    fits = [problem.fit(trial.theta, trial.local, tolerance=tolerance) for trial in tried[:FINALISTS]]
+    fits = [problem.fit(t.theta, t.local, max_steps=max_steps, tolerance=tolerance) for t in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
     return problem.fit(best.theta, best.local) if plant.sign_hidden else best
 

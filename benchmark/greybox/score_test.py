@@ -94,7 +94,7 @@ def extend(
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
     if term.effect.moves_poles:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
-        return refit_from_poles(baseline.problem(plant), thetas, TOLERANCE)
+        return refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
     jacobian = jacobian or jacobian_of(baseline, estimate)
     scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
     if not scored or scored[0][0] < WORTH_A_REFIT:
