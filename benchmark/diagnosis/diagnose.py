@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from simgap.diagnosis import checks, doubts, gains
+from simgap.diagnosis import checks, doubts, gains, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.error_views.views import views
 from simgap.findings import Cause, Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
-from simgap.greybox.identification import identify
+from simgap.greybox.identification import channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.selection import MAX_TERMS
@@ -55,6 +55,7 @@ def diagnose(
     dataset = with_kinds(dataset, kind)
     check_numbers(dataset.test, dataset.channels)
     identified = identify(dataset.training)
+    dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, dataset.training))
     model = GreyBoxModel([one.plant for one in identified])
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
@@ -69,6 +70,8 @@ def diagnose(
     verdict: Verdict = "named" if causes else "nothing_found"
     if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
         verdict, causes = "unexplained", ()
+    if verdict == "nothing_found":
+        doubt = doubt or unsaid_kinds.undecided(identified, dataset.channels)
     if not causes:
         after = before
     gain = gains.measure(dataset, before, after)
@@ -88,8 +91,9 @@ def diagnose(
         units={channel.name: channel.unit for channel in dataset.channels.outputs},
         inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
+        kinds_from={channel.name: channel.kind_from for channel in dataset.channels.outputs},
         doubts=doubt,
-        checks=checks.look(dataset),
+        checks=(*unsaid_kinds.taken_for(dataset.channels), *checks.look(dataset)),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, after),
@@ -110,7 +114,11 @@ def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
 def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
     """List the named effects of all plants, those of the plant that they explain best first."""
     plants = sorted(evidence, key=lambda plant: -plant.explained)
-    return tuple(cause for plant in plants for cause in plant.causes(profiles))
+    return tuple(
+        cause
+        for plant in plants
+        for cause in unsaid_kinds.confounded(plant.causes(profiles), plant.identified, plant.channels)
+    )
 
 
 def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:
