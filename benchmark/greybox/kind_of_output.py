@@ -22,6 +22,7 @@ from simgap.records import Channels, Kind, TrainingSet
 
 # Two kinds whose scores (log-likelihood, less what the parameters cost) differ by less are not told apart.
 ALIKE = 6.0
+FINALISTS = 4  # effects of a kind, those that fit best
 # Of the spread of a signal: what noise takes a level, or the flow into a tank, below zero.
 BELOW_ZERO = 0.1
 
@@ -37,7 +38,8 @@ class Hypothesis:
 
     def judged(self, judge: Baseline, noise_order: int) -> Standing:
         """Find its best model: the plain one, or one with an effect that noise would not do as well as."""
-        plain, *larger = (assess(judge, fit, noise_order) for fit in (self.baseline.estimate, *self.larger))
+        closest = sorted(self.larger, key=lambda fit: float(np.sum(fit.errors**2)))[:FINALISTS]
+        plain, *larger = (assess(judge, fit, noise_order) for fit in (self.baseline.estimate, *closest))
         better = ranked([trial for trial in larger if significant(judge, plain, trial)])
         return Standing(self, better[0] if better else plain)
 
@@ -60,14 +62,14 @@ class Standing:
         An effect is named only where no plain model does as well, so that it must beat such a one by its score too.
         """
         mine, its = self.trial, other.trial
-        likelier = mine.score > its.score + ALIKE and not _fit_alike(mine, its)
+        likelier = mine.score > its.score + ALIKE and not _fit_alike(mine.estimate, its.estimate)
         if _simulates_better(mine, its, judge):
             return likelier or self.lead is None or other.lead is not None
         return likelier and not _simulates_better(its, mine, judge)
 
 
-def _fit_alike(one: Trial, other: Trial) -> bool:
-    squares = [float(np.sum(trial.estimate.errors**2)) for trial in (one, other)]
+def _fit_alike(one: Estimate, other: Estimate) -> bool:
+    squares = [float(np.sum(fit.errors**2)) for fit in (one, other)]
     return max(squares) - min(squares) < MATTERS * max(squares)
 
 
@@ -98,10 +100,16 @@ def settle(data: TrainingSet, channels: Channels, output: int) -> Settled:
     left = left or [min(standings, key=lambda s: float(s.trial.blocks.sum()))]
     plain = [s for s in left if s.lead is None]
     chosen = max(plain or left, key=lambda s: (s.lead is None and s.hypothesis.kind == "other", s.trial.score))
-    name = chosen.lead.name if chosen.lead else ""
-    rivals = {s.lead.name: (s.hypothesis.kind, s.lead) for s in left if s.lead is not None and s.lead.name != name}
+    # Where a plain model is enough, only one that does the very same with an effect puts it in doubt.
+    rivals = [
+        s
+        for s in left
+        if s.lead and (_fit_alike(s.trial.estimate, chosen.trial.estimate) if chosen.lead is None else True)
+    ]
+    named = {s.lead.name: (s.hypothesis.kind, s.lead) for s in rivals if s.lead is not None}
     one = chosen.hypothesis
-    return Settled(one.kind, one.baseline, one.compared or {}, tuple(rivals.values()))
+    others = tuple(rival for name, rival in named.items() if chosen.lead is None or name != chosen.lead.name)
+    return Settled(one.kind, one.baseline, one.compared or {}, others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +120,14 @@ class _Contest:
 
     @cached_property
     def other(self) -> Hypothesis:
-        """Without a claim. A model of high order, which takes long to extend, is not where another kind beats it."""
+        """Without a claim. It is not extended where that tells no more, because its high orders take long to fit.
+
+        That is where the plain model of a kind fits as it does, or a kind with an effect beats a model of high order.
+        """
         plain = Hypothesis("other", self._baseline("other"))
-        plant = plain.baseline.plant
+        plant, estimate = plain.baseline.plant, plain.baseline.estimate
+        if any(_fit_alike(kind.baseline.estimate, estimate) for kind in self._with_claims):
+            return plain
         if plant.order > 2 or plant.zeros:
             judge, (other, *moving) = _judged([plain, *self._with_claims])
             if any(s.lead is not None and s.beats(other, judge) for s in moving):
