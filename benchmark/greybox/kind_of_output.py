@@ -22,7 +22,6 @@ from simgap.records import Channels, Kind, TrainingSet
 
 # Two kinds whose scores (log-likelihood, less what the parameters cost) differ by less are not told apart.
 ALIKE = 6.0
-FINALISTS = 4  # effects of a kind, those that fit best
 # Of the spread of a signal: what noise takes a level, or the flow into a tank, below zero.
 BELOW_ZERO = 0.1
 
@@ -38,8 +37,7 @@ class Hypothesis:
 
     def judged(self, judge: Baseline, noise_order: int) -> Standing:
         """Find its best model: the plain one, or one with an effect that noise would not do as well as."""
-        closest = sorted(self.larger, key=lambda fit: float(np.sum(fit.errors**2)))[:FINALISTS]
-        plain, *larger = (assess(judge, fit, noise_order) for fit in (self.baseline.estimate, *closest))
+        plain, *larger = (assess(judge, fit, noise_order) for fit in (self.baseline.estimate, *self.larger))
         better = ranked([trial for trial in larger if significant(judge, plain, trial)])
         return Standing(self, better[0] if better else plain)
 
@@ -100,16 +98,18 @@ def settle(data: TrainingSet, channels: Channels, output: int) -> Settled:
     left = left or [min(standings, key=lambda s: float(s.trial.blocks.sum()))]
     plain = [s for s in left if s.lead is None]
     chosen = max(plain or left, key=lambda s: (s.lead is None and s.hypothesis.kind == "other", s.trial.score))
-    # Where a plain model is enough, only one that does the very same with an effect puts it in doubt.
-    rivals = [
-        s
-        for s in left
-        if s.lead and (_fit_alike(s.trial.estimate, chosen.trial.estimate) if chosen.lead is None else True)
-    ]
-    named = {s.lead.name: (s.hypothesis.kind, s.lead) for s in rivals if s.lead is not None}
     one = chosen.hypothesis
-    others = tuple(rival for name, rival in named.items() if chosen.lead is None or name != chosen.lead.name)
-    return Settled(one.kind, one.baseline, one.compared or {}, others)
+    return Settled(one.kind, one.baseline, one.compared or {}, _rivals(chosen, left))
+
+
+def _rivals(chosen: Standing, left: Sequence[Standing]) -> tuple[tuple[Kind, Effect], ...]:
+    """List other names, with a kind for each; a plain model is in doubt only where an effect does the very same."""
+    rivals: dict[str, tuple[Kind, Effect]] = {}
+    for one in left:
+        same_fit = _fit_alike(one.trial.estimate, chosen.trial.estimate)
+        if one.lead and (same_fit if chosen.lead is None else one.lead.name != chosen.lead.name):
+            rivals.setdefault(one.lead.name, (one.hypothesis.kind, one.lead))
+    return tuple(rivals.values())
 
 
 @dataclass(frozen=True, eq=False)
