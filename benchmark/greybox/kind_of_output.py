@@ -120,16 +120,18 @@ class _Contest:
 
     @cached_property
     def other(self) -> Hypothesis:
-        """Without a claim. It is not extended where that tells no more, because its high orders take long to fit.
+        """Without a claim. High orders take long to extend, so that it is done only where it may tell more.
 
-        That is where the plain model of a kind fits as it does, or a kind with an effect beats a model of high order.
+        Where the plain model of a kind fits alike, effects do the same for both; where a kind with an effect beats a
+        plain model of high order, they do no better.
         """
         plain = Hypothesis("other", self._baseline("other"))
         plant, estimate = plain.baseline.plant, plain.baseline.estimate
-        if any(_fit_alike(kind.baseline.estimate, estimate) for kind in self._with_claims):
-            return plain
+        for kind in self._with_claims:
+            if kind.kind != "level" and _fit_alike(kind.baseline.estimate, estimate):
+                return replace(plain, larger=kind.larger)
         if plant.order > 2 or plant.zeros:
-            judge, (other, *moving) = _judged([plain, *self._with_claims])
+            judge, (*moving, other) = _judged([*self._with_claims, plain])
             if any(s.lead is not None and s.beats(other, judge) for s in moving):
                 return plain
         return _extended(plain)
@@ -148,7 +150,7 @@ class _Contest:
 
     @cached_property
     def _judged(self) -> tuple[Baseline, list[Standing]]:
-        return _judged([self.other, *self._with_claims])
+        return _judged([*self._with_claims, self.other])
 
     @property
     def judge(self) -> Baseline:
@@ -192,10 +194,10 @@ def _if_tank(level: Hypothesis) -> list[Hypothesis]:
 
 def _judged(tried: Sequence[Hypothesis]) -> tuple[Baseline, list[Standing]]:
     """Judge all by the readings that none of them takes for an outlier, under the noise that the best one leaves."""
-    first = tried[0].baseline
+    unclaimed = tried[-1].baseline
     train = np.logical_and.reduce([h.baseline.train.mask for h in tried])
     valid = np.logical_and.reduce([h.baseline.valid.mask for h in tried])
-    judge = replace(first, train=replace(first.train, mask=train), valid=replace(first.valid, mask=valid))
+    judge = replace(unclaimed, train=replace(unclaimed.train, mask=train), valid=replace(unclaimed.valid, mask=valid))
     fits = [fit for h in tried for fit in (h.baseline.estimate, *h.larger)]
     best = min(fits, key=lambda fit: float(np.sum(fit.errors[train] ** 2)))
     noise_order = schwarz_order(best.errors, train, judge.resolution)
