@@ -93,7 +93,7 @@ def diagnose(
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
         kinds_from={channel.name: channel.kind_from for channel in dataset.channels.outputs},
         doubts=doubt,
-        checks=(*unsaid_kinds.taken_for(dataset.channels), *checks.look(dataset)),
+        checks=(*unsaid_kinds.taken_for(identified, dataset.channels), *checks.look(dataset)),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, after),

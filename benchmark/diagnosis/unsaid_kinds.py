@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from simgap.findings import Cause, Separation
 from simgap.greybox.identification import Identified
-from simgap.records import Channel, Channels, Dataset
+from simgap.records import Channel, Channels, Dataset, Kind
 
 CALLED = {"position": "a position", "velocity": "a velocity", "level": "a level", "other": "anything else"}
 
@@ -17,20 +17,31 @@ def with_channels(dataset: Dataset, channels: Channels) -> Dataset:
     return replace(dataset, training=replace(dataset.training, channels=channels), channels=channels)
 
 
-def taken_for(channels: Channels) -> tuple[str, ...]:
+def taken_for(identified: Sequence[Identified], channels: Channels) -> tuple[str, ...]:
     """Say in a sentence for what each output is taken that nobody said anything of."""
-    return tuple(_taken_for(channel) for channel in channels.outputs if channel.kind_from == "evidence")
+    as_well = {one.selection.baseline.outputs[0]: one.settled.as_well for one in identified if one.settled}
+    return tuple(
+        _taken_for(channel, as_well.get(i, ()))
+        for i, channel in enumerate(channels.outputs)
+        if channel.kind_from == "evidence"
+    )
 
 
-def _taken_for(channel: Channel) -> str:
+def _taken_for(channel: Channel, as_well: Sequence[Kind]) -> str:
     if channel.kind == "other":
         return (
             f"Nobody says what {channel.name} is, and the records do not show a position, a velocity or a level: where "
             f"it is one, say so with --kind {channel.name}=position, velocity or level."
         )
+    claims = [CALLED[kind] for kind in as_well if kind != "other"]
+    why = (
+        f"which is simpler than {' or '.join(claims)} and does as well"
+        if claims
+        else "because the records speak for it"
+    )
     return (
-        f"{channel.name} is taken as {CALLED[channel.kind]}, because the records speak for it: where it is anything "
-        f"else, say so with --kind {channel.name}=position, velocity, level or other."
+        f"{channel.name} is taken as {CALLED[channel.kind]}, {why}: where it is anything else, say so with "
+        f"--kind {channel.name}=position, velocity, level or other."
     )
 
 

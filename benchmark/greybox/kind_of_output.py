@@ -84,22 +84,27 @@ class Settled:
     baseline: Baseline
     compared: Compared
     rivals: tuple[tuple[Kind, Effect], ...] = ()
+    as_well: tuple[Kind, ...] = ()  # kinds that do as well and lead to the same
 
 
 def settle(data: TrainingSet, channels: Channels, output: int) -> Settled:
     """Decide by the records what an output is: each kind's plain model and one effect, against each other.
 
-    A plain model that the records do not speak against makes the effects of other kinds needless. Where that is the
-    one of `other`, nothing is gained by a claim.
+    Of the kinds that the records do not speak against, the simplest model is taken. A plain one makes the effects of
+    other kinds needless; where that is the one of `other`, nothing is gained by a claim.
     """
-    tried = _Contest(data, channels, output)
-    judge, standings = tried.judge, tried.standings
+    judge, standings = _Hypotheses(data, channels, output).standings()
     left = [s for s in standings if not any(o.beats(s, judge) for o in standings if o is not s)]
     left = left or [min(standings, key=lambda s: float(s.trial.blocks.sum()))]
     plain = [s for s in left if s.lead is None]
-    chosen = max(plain or left, key=lambda s: (s.lead is None and s.hypothesis.kind == "other", s.trial.score))
-    one = chosen.hypothesis
-    return Settled(one.kind, one.baseline, one.compared or {}, _rivals(chosen, left))
+    unclaimed = [s for s in plain if s.hypothesis.kind == "other"]
+    chosen = min(unclaimed or plain or left, key=lambda s: (s.trial.cost, -s.trial.score))
+    one, same = chosen.hypothesis, [s.hypothesis.kind for s in left if s is not chosen and _same(s.lead, chosen.lead)]
+    return Settled(one.kind, one.baseline, one.compared or {}, _rivals(chosen, left), tuple(same))
+
+
+def _same(one: Effect | None, other: Effect | None) -> bool:
+    return (one and one.name) == (other and other.name)
 
 
 def _rivals(chosen: Standing, left: Sequence[Standing]) -> tuple[tuple[Kind, Effect], ...]:
@@ -113,13 +118,19 @@ def _rivals(chosen: Standing, left: Sequence[Standing]) -> tuple[tuple[Kind, Eff
 
 
 @dataclass(frozen=True, eq=False)
-class _Contest:
+class _Hypotheses:
+    """The kinds that one output may be of; what is fitted for one of them serves the others."""
+
     data: TrainingSet
     channels: Channels
     output: int
 
-    @cached_property
-    def other(self) -> Hypothesis:
+    def standings(self) -> tuple[Baseline, list[Standing]]:
+        """Judge all of them; return the records and the noise of that judgement too."""
+        return _judge([*self._with_claims, self._other])
+
+    @property
+    def _other(self) -> Hypothesis:
         """Without a claim. High orders take long to extend, so that it is done only where it may tell more.
 
         Where the plain model of a kind fits alike, effects do the same for both; where a kind with an effect beats a
@@ -131,7 +142,7 @@ class _Contest:
             if kind.kind != "level" and _fit_alike(kind.baseline.estimate, estimate):
                 return replace(plain, larger=kind.larger)
         if plant.order > 2 or plant.zeros:
-            judge, (*moving, other) = _judged([*self._with_claims, plain])
+            judge, (*moving, other) = _judge([*self._with_claims, plain])
             if any(s.lead is not None and s.beats(other, judge) for s in moving):
                 return plain
         return _extended(plain)
@@ -147,20 +158,6 @@ class _Contest:
         if self._never_negative:
             found += _if_tank(Hypothesis("level", self._baseline("level")))
         return found
-
-    @cached_property
-    def _judged(self) -> tuple[Baseline, list[Standing]]:
-        return _judged([*self._with_claims, self.other])
-
-    @property
-    def judge(self) -> Baseline:
-        """The records and the noise by which all are judged."""
-        return self._judged[0]
-
-    @property
-    def standings(self) -> list[Standing]:
-        """All hypotheses with their best models."""
-        return self._judged[1]
 
     def _baseline(self, kind: Kind) -> Baseline:
         data, channels = self.data, with_kind(self.channels, self.output, kind)
@@ -192,7 +189,7 @@ def _if_tank(level: Hypothesis) -> list[Hypothesis]:
     return [replace(level, larger=known)] if known else []
 
 
-def _judged(tried: Sequence[Hypothesis]) -> tuple[Baseline, list[Standing]]:
+def _judge(tried: Sequence[Hypothesis]) -> tuple[Baseline, list[Standing]]:
     """Judge all by the readings that none of them takes for an outlier, under the noise that the best one leaves."""
     unclaimed = tried[-1].baseline
     train = np.logical_and.reduce([h.baseline.train.mask for h in tried])
