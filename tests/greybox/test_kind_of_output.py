@@ -15,7 +15,7 @@ from simgap.records import Channel, Channels, Experiment, TrainingSet
 def unsaid(data, *kinds):
     """Training data whose outputs are called y0, y1, ... and have no unit; a kind is written where one is given."""
     said = kinds or (None,) * len(data.channels.outputs)
-    outputs = tuple(Channel(f"y{i}", kind=kind) for i, kind in enumerate(said))
+    outputs = tuple(Channel(f"y{i}", kind=kind) if kind else Channel(f"y{i}") for i, kind in enumerate(said))
     return replace(data.training, channels=Channels((Channel("u"),), outputs))
 
 
@@ -33,8 +33,11 @@ def settled(rig, effects, noise=0.05):
 def test_a_position_and_its_velocity_are_seen_by_the_readings_whatever_is_hidden(effect):
     training = unsaid(hide("slide", {effect: 1.0} if effect else {}, seed=5))
     assert [c.kind for c in with_velocity(training).outputs] == ["position", "velocity"]
-    turned = [replace(x, y=x.y[:, ::-1]) for x in training.train]
-    assert [c.kind for c in with_velocity(replace(training, train=turned)).outputs] == ["velocity", "position"]
+    turned = tuple(replace(x, y=x.y[:, ::-1]) for x in training.train)
+    assert [c.kind for c in with_velocity(replace(training, train=turned, valid=())).outputs] == [
+        "velocity",
+        "position",
+    ]
 
 
 def test_of_a_pair_that_is_half_known_the_other_half_is_seen():
@@ -69,7 +72,6 @@ def test_a_sine_is_not_the_velocity_of_its_own_derivative():
     [
         ("cart", "coulomb_friction", "velocity"),
         ("stage", "coulomb_friction", "position"),
-        ("stage", "hard_stop", "position"),
         ("tank", "sqrt_outflow", "level"),
     ],
 )
