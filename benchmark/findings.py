@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from simgap.records import Kind
+from simgap.records import Kind, KindFrom
 
 # suspected: effects that passed in training, but their gain on the test split may be chance.
 Verdict = Literal["named", "suspected", "nothing_found", "unexplained"]
@@ -182,6 +182,7 @@ class Findings:
     units: dict[str, str] = field(default_factory=dict)
     inputs: tuple[tuple[str, str], ...] = ()  # names and units
     kinds: dict[str, str] = field(default_factory=dict)
+    kinds_from: dict[str, KindFrom] = field(default_factory=dict)  # who knows them
     doubts: tuple[str, ...] = ()  # why nothing can be named on these records, one sentence each
     checks: tuple[str, ...] = ()  # what the data checks found, one sentence each
     left: float = 0.0  # share of what remains after the causes that could still be predicted from the input
@@ -210,6 +211,7 @@ class Findings:
             "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
             "gain": vars(self.gain),
+            "kinds": {name: {"kind": kind, "from": self.kinds_from.get(name)} for name, kind in self.kinds.items()},
             "doubts": list(self.doubts),
             "checks": list(self.checks),
             "left": self.left,

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 Kind = Literal["position", "velocity", "level", "other"]
-KindFrom = Literal["written", "header", "option", "unknown"]
+KindFrom = Literal["written", "header", "option", "evidence", "unknown"]
 Status = Literal["ok", "diverged", "error", "timeout"]
 
 # No measurement is larger; squares and sums of squares of such values still fit into float64.
@@ -33,7 +33,8 @@ class Channel:
     """One column of `u` or `y`: its name, its physical unit and, for outputs, what kind of motion it is.
 
     `kind_from` says who knows the kind: somebody wrote it (also in Python), a heading with its unit told it, an option
-    did, or nobody. A kind that is left out is "other" and unknown. Channels are equal whoever knows their kind.
+    did, the records showed it, or nobody knows. A kind that is left out is "other" and unknown. Channels are equal
+    whoever knows their kind.
     """
 
     name: str

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from simgap.diagnosis import checks, doubts, gains, promises
+from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.error_views.views import views
 from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
-from simgap.greybox.identification import identify
+from simgap.greybox.identification import channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
 from simgap.metrics import is_finite, relative, spread
@@ -54,6 +54,7 @@ def diagnose(
     dataset = with_kinds(dataset, kind)
     check_numbers(dataset.test, dataset.channels)
     identified = identify(dataset.training)
+    dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, dataset.training))
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     evidence = [Evidence(one, dataset.channels) for one in identified]
@@ -70,6 +71,8 @@ def diagnose(
     elif found and not doubt:
         promised = promises.promise(trusted, dataset, before, profiles)
         verdict = "named" if promised.causes else "suspected"
+    if verdict == "nothing_found":
+        doubt = doubt or unsaid_kinds.undecided(identified, dataset.channels)
     findings = Findings(
         dataset=dataset.name,
         verdict=verdict,
@@ -82,8 +85,9 @@ def diagnose(
         units={channel.name: channel.unit for channel in dataset.channels.outputs},
         inputs=tuple((channel.name, channel.unit) for channel in dataset.channels.inputs),
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
+        kinds_from={channel.name: channel.kind_from for channel in dataset.channels.outputs},
         doubts=doubt,
-        checks=checks.limitations(dataset),
+        checks=(*unsaid_kinds.taken_for(identified, dataset.channels), *checks.limitations(dataset)),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, promised.after if promised else before),

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simgap.diagnosis import gains
+from simgap.diagnosis import gains, unsaid_kinds
 from simgap.findings import Cause, Gain
 from simgap.greybox.evidence import Evidence
-from simgap.greybox.identification import Identified
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import Term
 from simgap.greybox.selection import MAX_TERMS
@@ -80,7 +79,11 @@ def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:
 
 
 def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
-    return tuple(cause for plant in _in_order(evidence) for cause in plant.causes(profiles))
+    return tuple(
+        cause
+        for plant in _in_order(evidence)
+        for cause in unsaid_kinds.confounded(plant.causes(profiles), plant.identified, plant.channels)
+    )
 
 
 def _only(plant: Evidence, terms: Sequence[Term]) -> Evidence:
@@ -90,4 +93,6 @@ def _only(plant: Evidence, terms: Sequence[Term]) -> Evidence:
         return plant
     trial = selection.only(terms)
     smaller = FittedPlant.fit(trial.estimate, selection.baseline, plant.identified.plant.experiments)
-    return replace(plant, identified=Identified(replace(selection, trial=trial), smaller))
+    return replace(
+        plant, identified=replace(plant.identified, selection=replace(selection, trial=trial), plant=smaller)
+    )

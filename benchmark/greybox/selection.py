@@ -70,9 +70,12 @@ class Selection:
         return compare(self.baseline, trial.estimate, self.noise_order, dict(self.compared))
 
 
-def select(baseline: Baseline) -> Selection:
-    """Choose effects: what the readings show, what a linear model lacks, then all; superfluous ones are taken out."""
-    search = _Search(baseline)
+def select(baseline: Baseline, compared: Compared | None = None) -> Selection:
+    """Choose effects: what the readings show, what a linear model lacks, then all; superfluous ones are taken out.
+
+    What was `compared` before on this baseline is not fitted again.
+    """
+    search = _Search(baseline, compared=dict(compared or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
     trial = search.forward(trial, linear_only=True)
     trial = search.forward(trial)

@@ -43,8 +43,8 @@ MEASURED = (
 )  # fmt: skip
 # With the likelihood profiles of all parameters.
 PROFILED = ("cart-coulomb", "stage-cubic")
-# Sentences for people, and what no two runs agree on.
-WORDS = ("text", "title", "separate_by", "checks", "seconds")
+# Sentences for people, what the data set says itself, and what no two runs agree on.
+WORDS = ("text", "title", "separate_by", "checks", "kinds", "seconds")
 
 
 def folder_of(name: str) -> Path:

@@ -1,0 +1,71 @@
+"""A card that is left out: the records decide what an output is, and the answer stays what it was with the card."""
+
+import csv
+from dataclasses import replace
+
+import pytest
+
+from simgap.data import load
+from simgap.data.simulated.rigs import RIGS, hide, suitable
+from simgap.diagnosis.diagnose import diagnose
+from simgap.records import Channel, Channels
+
+# Only who knows what the output is can name these: another kind of plant does the same without them. Of a position with
+# its velocity the readings tell the kinds.
+KNOWN_BY_THE_CARD = ("actuator_lag", "sensor_lag", "constant_load")
+FAST = [("cart", "coulomb_friction"), ("slide", "input_delay")]
+REST = [
+    (rig, effect)
+    for rig in RIGS
+    for effect in ("", *suitable(rig))
+    if (rig, effect) not in FAST and (rig == "slide" or effect not in KNOWN_BY_THE_CARD)
+]
+
+
+def without_card(data):
+    """The same records with columns called u and y."""
+    outputs = tuple(Channel(f"y{i}", c.unit) for i, c in enumerate(data.channels.outputs))
+    channels = Channels((Channel("u"),), outputs)
+    return replace(data, training=replace(data.training, channels=channels), channels=channels)
+
+
+def told(answer):
+    return answer.verdict, [cause.effect for cause in answer.findings.effects][:1]
+
+
+@pytest.mark.parametrize(
+    ("rig", "effect"), [*FAST, *(pytest.param(*case, marks=pytest.mark.slow) for case in REST[::3])]
+)
+def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
+    data = hide(rig, {effect: 1.0} if effect else {}, 0.05, seed=7)
+    assert told(diagnose(without_card(data), views_too=False)) == told(diagnose(data, views_too=False))
+
+
+def test_a_file_with_meaningless_headings_gets_the_answer_that_it_gets_where_the_kind_is_said(tmp_path):
+    data = hide("cart", {"coulomb_friction": 1.0}, 0.05, seed=7)
+    with (tmp_path / "motor.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["u", "y"])
+        for x in data.training.train:
+            rows.writerows([*u, *y] for u, y in zip(x.u, x.y, strict=True))
+    flat = load(tmp_path / "motor.csv", ["u"], ["y"], dt=data.training.dt)
+    assert flat.channels.outputs[0].kind_from == "unknown"
+    answer = diagnose(flat, views_too=False)
+    assert told(answer) == told(diagnose(flat, views_too=False, kind="velocity"))
+    assert told(answer)[1] == ["coulomb_friction"]
+    assert "y is taken as a velocity" in " ".join(str(answer).split())
+    assert answer.to_json()["kinds"] == {"y": {"kind": "velocity", "from": "evidence"}}
+
+
+def test_a_kind_that_is_said_is_not_asked_of_the_records():
+    data = hide("cart", {"coulomb_friction": 1.0}, 0.05, seed=7)
+    answer = diagnose(without_card(data), views_too=False, kind="other")
+    assert answer.to_json()["kinds"] == {"y0": {"kind": "other", "from": "option"}}
+    assert not any("is taken as" in check for check in answer.findings.checks)
+
+
+def test_where_the_name_hangs_on_the_kind_the_first_sentence_asks_for_it():
+    answer = diagnose(without_card(hide("cart", {"actuator_lag": 0.5}, 0.05, seed=14)), views_too=False)
+    assert answer.verdict == "nothing_found"
+    assert answer.findings.doubts[0].startswith("What y0 is decides the answer")
+    assert "as a velocity it has actuator lag" in answer.findings.doubts[0]
