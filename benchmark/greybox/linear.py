@@ -27,6 +27,7 @@ BLOCKS = 20
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
 SMOOTH = 20.0
 EARLY = 0.25  # samples
+UNEXPLAINED = 0.5  # share of the output's variance
 
 
 def find_baseline(
@@ -50,8 +51,9 @@ def find_baseline(
         models = plain_models(records, held_out, kind, n_init)
 
     def baseline_of(plain: Estimate) -> Baseline:
-        problem = Problem(plain.plant, records, white(records.sizes))
-        plant = replace(plain.plant, scales=scales_of(plain, problem, channels, outputs))
+        moved = _under_load(plain, records)
+        problem = Problem(moved.plant, records, white(records.sizes))
+        plant = replace(plain.plant, scales=scales_of(moved, problem, channels, outputs))
         return Baseline(records, held_out, tuple(outputs), replace(plain, plant=plant), cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
@@ -65,6 +67,19 @@ def find_baseline(
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
+
+
+def _under_load(plain: Estimate, records: Records) -> Estimate:
+    """Fit a constant force too, where the model without one explains less than half of the output.
+
+    What a load carries away from an operating point that the model does not have says nothing of gain and forces.
+    """
+    before, sizes = plain.plant, records.sizes
+    left = np.mean((plain.errors[records.mask] / sizes) ** 2)
+    if left < UNEXPLAINED or before.offset or before.cascade or before.imposed:
+        return plain
+    loaded = fit_plain(replace(before, offset=True, zeros=0, taps=(0,)), records)
+    return loaded if np.mean((loaded.errors[records.mask] / sizes) ** 2) < UNEXPLAINED * left else plain
 
 
 def _instead_of_order(term: Term, plant: Plant) -> bool:

@@ -67,13 +67,12 @@ def heat_loop(rng: Generator) -> Plant:
     return Plant(machine, controller, tau / rng.uniform(8, 15), tau, (size,), (50.0 * steady,), named)
 
 
-def axis(rng: Generator) -> Plant:
+def axis(rng: Generator, closed: bool) -> Plant:
     """Draw an axis without a spring, under PD control or driven by pushes of either sign."""
     damping, gain = log_uniform(rng, 0.5, 8.0), log_uniform(rng, 0.5, 20.0)
     speed = damping * rng.uniform(0.8, 2.5)  # of the closed loop, rad/s
     ratio = rng.uniform(0.7, 1.1)
     machine = Machine(gain=gain, damping=damping)
-    closed = rng.random() < 0.5
     kd = max(2 * ratio * speed - damping, 0.0) / gain
     controller = Controller(True, speed**2 / gain, kd=kd) if closed else Controller()
     dt = 1 / (max(damping, speed) * rng.uniform(6, 12))
@@ -145,7 +144,14 @@ RIGS = {
     for rig in (
         Rig("speed_loop", speed_loop, ("coulomb_friction", "input_saturation", "dead_zone", "backlash", "input_delay")),
         Rig("heat_loop", heat_loop, ("input_saturation", "backlash", "input_delay")),
-        Rig("axis", axis, ("coulomb_friction", "constant_load", "input_delay", "dead_zone", "input_saturation")),
+        Rig(
+            "axis", lambda rng: axis(rng, True),
+            ("coulomb_friction", "constant_load", "input_delay", "dead_zone", "input_saturation"),
+        ),
+        Rig(
+            "axis_open", lambda rng: axis(rng, False),
+            ("coulomb_friction", "input_delay", "dead_zone", "input_saturation"),
+        ),
         *(
             Rig(
                 name, lambda rng, measured=measured: joint(rng, measured),
