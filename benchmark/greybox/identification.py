@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from simgap.greybox.linear import find_baseline
+from simgap.greybox.baseline import Baseline
+from simgap.greybox.fitting import Estimate
+from simgap.greybox.linear import find_baseline, with_joint
 from simgap.greybox.model import FittedPlant
+from simgap.greybox.noise import schwarz_order
 from simgap.greybox.plant import plants_of
-from simgap.greybox.selection import Selection, select
+from simgap.greybox.selection import BETTER, Selection, select
+from simgap.greybox.trial import assess
 from simgap.records import TrainingSet
 
 
@@ -27,9 +31,35 @@ class Identified:
 
 def identify(data: TrainingSet) -> list[Identified]:
     """Select effects on excerpts of the training data, then fit them to all of it, plant by plant."""
-    selections = [
-        select(find_baseline(data.train, data.valid, data.channels, outputs, data.n_init))
-        for outputs in plants_of(data.channels)
-    ]
+    selections = [_selected(data, outputs) for outputs in plants_of(data.channels)]
     experiments = data.train + data.valid
     return [Identified(s, FittedPlant.fit(s.trial.estimate, s.baseline, experiments)) for s in selections]
+
+
+def _selected(data: TrainingSet, outputs: tuple[int, ...]) -> Selection:
+    """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
+    rigid = select(find_baseline(data.train, data.valid, data.channels, outputs, data.n_init))
+    joint = with_joint(rigid.baseline, data.channels, data.n_init)
+    if joint is None or not _better(_on(joint, rigid.trial.estimate), joint, rigid):
+        return rigid
+    flexible = select(joint)
+    return flexible if _better(flexible.trial.estimate, joint, rigid) else rigid
+
+
+def _on(joint: Baseline, rigid: Estimate) -> Estimate:
+    """Fit the effects of a rigid drive on one with a joint."""
+    plant = joint.plant.having(rigid.plant.terms)
+    theta, local = plant.carry(joint.plant, joint.estimate.theta, joint.estimate.local)
+    for term in plant.terms:
+        if term in plant.per_experiment:
+            local[:, plant.local_index(term)] = rigid.local[:, rigid.plant.local_index(term)]
+        else:
+            theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
+    return joint.fit(plant.terms, [(theta, local)])
+
+
+def _better(estimate: Estimate, joint: Baseline, rigid: Selection) -> bool:
+    """Tell whether the score of a drive with a joint is higher, under noise of one memory."""
+    order = max(rigid.noise_order, schwarz_order(estimate.errors, joint.train.mask, joint.resolution))
+    flexible = assess(joint, estimate, order)
+    return flexible.score > assess(rigid.baseline, rigid.trial.estimate, order).score + BETTER

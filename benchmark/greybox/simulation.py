@@ -13,6 +13,7 @@ from numba import cfunc
 from simgap.greybox.effects.effect import InputEffect, OutputEffect
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_plant_directly, transition
 from simgap.greybox.plant import Plant
+from simgap.greybox.two_masses import ENTRY
 
 ROLES = {"force": 0, "friction": 1, "outflow": 2, "rim": 3, "stop": 4}
 
@@ -80,9 +81,9 @@ class Simulator:
                 continue
             a = plant.matrix(theta)
             transition(a, self.h, e[i], g0[i], g1[i])
-            rates[i] = -np.diag(a) if plant.cascade else -a[-1]
+            rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
         states = np.empty((s, experiments, samples, n))
-        entry, fast = (0, 0) if plant.cascade else (n - 1, min(1, n - 1))
+        entry, fast = (0, 0) if plant.cascade else (ENTRY if plant.joint else n - 1, min(1, n - 1))
         run_plant_directly(
             e, g0, g1, rates, entry, fast, np.stack([self.drive(theta) for theta in thetas]),
             np.ascontiguousarray(starts), self.substeps, self.h, self._terms, self._n_terms, self._roles,
