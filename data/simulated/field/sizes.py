@@ -9,7 +9,7 @@ import numpy as np
 from simgap.data.simulated.field.kernels import Actuator, Machine
 from simgap.data.simulated.field.machines import RIGS, Plant
 
-ANGLES = ((0.0, 0.12), (0.25, 0.8), (0.5, 1.2), (1.0, 2.0))  # rad, that a pendulum reaches by strength
+ANGLES = ((0.0, 0.05), (0.25, 0.8), (0.5, 1.2), (1.0, 2.0))  # rad, that a pendulum reaches by strength
 
 
 def suitable(rig: str) -> tuple[str, ...]:
