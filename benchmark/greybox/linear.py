@@ -33,9 +33,16 @@ UNEXPLAINED = 0.5  # share of the output's variance
 
 
 def find_baseline(
-    train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int], n_init: int
+    train: Sequence[Experiment],
+    valid: Sequence[Experiment],
+    channels: Channels,
+    outputs: Sequence[int],
+    n_init: int,
+    every_reading: bool = False,
 ) -> Baseline:
     """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput.
+
+    Single readings that are far off are left out, unless it is to be of `every_reading`.
 
     Held-out records are simulated from their first n_init samples, as the test will be.
     """
@@ -46,7 +53,7 @@ def find_baseline(
     kind = channels.outputs[outputs[0]].kind
     models = plain_models(records, held_out, kind, n_init)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
-    outliers = [] if stepped else find_outliers(models[-1].errors, records.mask, records.resolution)
+    outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
