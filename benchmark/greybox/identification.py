@@ -18,7 +18,6 @@ from simgap.greybox.selection import BETTER, Selection, select
 from simgap.greybox.trial import assess
 from simgap.records import TrainingSet
 
-
 STILL_FAR = 0.5  # of the readings that were left out: fewer, and they were never bad
 
 

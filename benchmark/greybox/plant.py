@@ -10,8 +10,8 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
 from simgap.greybox import two_masses
+from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
 from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
 

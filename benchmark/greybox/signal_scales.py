@@ -24,7 +24,9 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     x, v = (signal[records.mask] for signal in problem.simulator.motion(estimate.theta, estimate.local))  # [N]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     # What would move the output by its size within the longest record, where the input does nothing.
-    force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (1 if plant.cascade else plant.force_order)
+    force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (
+        1 if plant.cascade else plant.force_order
+    )
     size = float(records.sizes[0])
     x_max = float(np.max(np.abs(x))) or size
     v_max = float(np.max(np.abs(v))) or size / records.duration

@@ -17,7 +17,6 @@ from numba import njit
 
 from simgap.data.simulated.rigs.kernels import sticking
 
-
 HELD = 2.0  # instead of a side of dry friction
 
 

@@ -38,8 +38,9 @@ def hide(
     where a controller closes the loop, its output also answers what is hidden. Raises ValueError for an effect that
     does not suit the machine.
     """
-    if unknown := set(effects) - set(suitable(rig)):
-        raise ValueError(f"{sorted(unknown)} cannot be hidden in {rig!r}; what can be: {', '.join(suitable(rig))}")
+    known = (*suitable(rig), *suitable(rig, outside=True))
+    if unknown := sorted(set(effects) - set(known)):
+        raise ValueError(f"{', '.join(unknown)} cannot be hidden in {rig!r}; what can be: {', '.join(known)}")
     rng = default_rng([APART + list(RIGS).index(rig), seed])
     plant = RIGS[rig].draw(rng)
     channel, jump = int(rng.integers(len(plant.scale))), float(rng.uniform(0.3, 0.9))
@@ -81,9 +82,7 @@ class _Bench:
         level = plant.middle[0] if plant.controller.closed else flow
         return (level, 0.0, level, 0.0) if plant.machine.process else (0.0, 0.0, 0.0, 0.0)
 
-    def record(
-        self, machine: Machine, actuator: Actuator, drift: float, noise: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def record(self, machine: Machine, actuator: Actuator, drift: float, noise: float) -> tuple[np.ndarray, np.ndarray]:
         """Run all experiments: inputs [E, T, nu] and true outputs [E, T]."""
         runs = [
             run(machine, self.plant.controller, actuator, wanted, noise * e, drift * d, self.start, self.plant.dt,
