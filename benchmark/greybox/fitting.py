@@ -107,8 +107,8 @@ class Problem:
         sizes, high = self.sizes(theta), plant.high
         steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
         unit = 1.0 if plant.imposed else self._sizes[0]
-        starts = [DIFFERENCE * unit * (1.0 if plant.cascade or plant.imposed else plant.dt**-(i % 2 if plant.joint else i))
-                  for i in range(plant.n_start)]  # fmt: skip
+        powers = [0 if plant.cascade or plant.imposed else i % 2 if plant.joint else i for i in range(plant.n_start)]
+        starts = [DIFFERENCE * unit * plant.dt**-power for power in powers]
         thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):

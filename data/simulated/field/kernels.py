@@ -1,6 +1,6 @@
 """The motion of the machines in the field, with their controllers, integrated at a fine fixed step.
 
-body:     q1'' = gain w + load + d(t) - damping q1' - stiffness q1 - stiffness3 q1^3 - gravity sin(q1) - joint - friction
+body:     q1'' = gain w + load + d(t) - damping q1' - k q1 - k3 q1^3 - gravity sin(q1) - joint - friction
           q2'' = ratio joint - link_damping q2',   joint = spring (q1 - q2) + loss (q1' - q2')
 process:  lag q1' = gain w + d(t) - q1,   second q2' = q1 - q2
 
