@@ -86,11 +86,13 @@ def with_joint(baseline: Baseline, channels: Channels, n_init: int) -> Baseline 
         return None
     poles = baseline.estimate.theta[rigid.layout.poles]
     tried = []
+    shapes = list(two_masses.shapes(poles, records.duration, dt))
     for side in ("motor", "load"):
         plant = Plant(
             "position", 4, rigid.nu, dt, two_outputs=rigid.two_outputs, offset=rigid.offset, taps=rigid.taps, joint=side
         )
-        fit = fit_plain(plant, records, shapes=list(two_masses.shapes(poles, records.duration, dt)))
+        fit = fit_plain(plant, records, shapes=shapes)
+        shapes = [*shapes[::4], list(fit.theta[plant.layout.poles])]  # both sides have the same poles
         if two_masses.swings(fit.theta[plant.layout.poles], records.duration, dt):
             tried.append(fit)
     before = block_errors(baseline.estimate, baseline.valid, n_init)
