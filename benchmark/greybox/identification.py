@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Estimate, Problem
-from simgap.greybox.linear import find_baseline, with_joint
+from simgap.greybox.fitting import Problem
+from simgap.greybox.joint import is_better, on_joint, with_joint
+from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant
-from simgap.greybox.noise import schwarz_order
 from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
 from simgap.greybox.samples import Records, excerpts
-from simgap.greybox.selection import BETTER, Selection, select
-from simgap.greybox.trial import assess
+from simgap.greybox.selection import Selection, select
 from simgap.records import TrainingSet
 
 STILL_FAR = 0.5  # of the readings that were left out: fewer, and they were never bad
@@ -46,10 +44,10 @@ def _selected(data: TrainingSet, outputs: tuple[int, ...]) -> Selection:
     """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
     rigid = _rigid(data, outputs)
     joint = with_joint(rigid.baseline, data.channels, data.n_init)
-    if joint is None or not _better(_on(joint, rigid.trial.estimate), joint, rigid):
+    if joint is None or not is_better(on_joint(joint, rigid.trial.estimate), joint, rigid):
         return rigid
     flexible = select(joint)
-    return flexible if _better(flexible.trial.estimate, joint, rigid) else rigid
+    return flexible if is_better(flexible.trial.estimate, joint, rigid) else rigid
 
 
 def _rigid(data: TrainingSet, outputs: tuple[int, ...]) -> Selection:
@@ -67,22 +65,3 @@ def _rigid(data: TrainingSet, outputs: tuple[int, ...]) -> Selection:
         if np.mean(flag(errors, records.mask).any(axis=2)[left_out]) < STILL_FAR:
             return select(find_baseline(*whole, every_reading=True))
     return selection
-
-
-def _on(joint: Baseline, rigid: Estimate) -> Estimate:
-    """Fit the effects of a rigid drive on one with a joint."""
-    plant = joint.plant.having(rigid.plant.terms)
-    theta, local = plant.carry(joint.plant, joint.estimate.theta, joint.estimate.local)
-    for term in plant.terms:
-        if term in plant.per_experiment:
-            local[:, plant.local_index(term)] = rigid.local[:, rigid.plant.local_index(term)]
-        else:
-            theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
-    return joint.fit(plant.terms, [(theta, local)])
-
-
-def _better(estimate: Estimate, joint: Baseline, rigid: Selection) -> bool:
-    """Tell whether the score of a drive with a joint is higher, under noise of one memory."""
-    order = max(rigid.noise_order, schwarz_order(estimate.errors, joint.train.mask, joint.resolution))
-    flexible = assess(joint, estimate, order)
-    return flexible.score > assess(rigid.baseline, rigid.trial.estimate, order).score + BETTER

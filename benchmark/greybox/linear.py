@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from simgap.greybox import two_masses
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, Problem, initial_states
@@ -28,7 +27,6 @@ BLOCKS = 20
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
 SMOOTH = 20.0
 EARLY = 0.25  # samples
-FEWEST_SAMPLES = 50  # of a record that may show how a joint swings
 UNEXPLAINED = 0.5  # share of the output's variance
 
 
@@ -60,7 +58,7 @@ def find_baseline(
         models = plain_models(records, held_out, kind, n_init)
 
     def baseline_of(plain: Estimate) -> Baseline:
-        plain = _scaled(plain, records, channels, outputs)
+        plain = scaled(plain, records, channels, outputs)
         return Baseline(records, held_out, tuple(outputs), plain, cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
@@ -76,37 +74,7 @@ def find_baseline(
     return baseline if smooth is None else baseline_of(smooth)
 
 
-def with_joint(baseline: Baseline, channels: Channels, n_init: int) -> Baseline | None:
-    """Put a flexible joint into a drive whose position is measured, on either side; None where none is seen to swing.
-
-    It must lower the held-out error as a higher order must, by more than a standard error.
-    """
-    rigid, records, dt = baseline.plant, baseline.train, baseline.plant.dt
-    if rigid.kind != "position" or rigid.order != 2 or rigid.joint or len(records.u[0]) < FEWEST_SAMPLES:
-        return None
-    poles = baseline.estimate.theta[rigid.layout.poles]
-    tried = []
-    shapes = list(two_masses.shapes(poles, records.duration, dt))
-    for side in ("motor", "load"):
-        plant = Plant(
-            "position", 4, rigid.nu, dt, two_outputs=rigid.two_outputs, offset=rigid.offset, taps=rigid.taps, joint=side
-        )
-        fit = fit_plain(plant, records, shapes=shapes)
-        shapes = [*shapes[::4], list(fit.theta[plant.layout.poles])]  # both sides have the same poles
-        if two_masses.swings(fit.theta[plant.layout.poles], records.duration, dt):
-            tried.append(fit)
-    before = block_errors(baseline.estimate, baseline.valid, n_init)
-    errors = [block_errors(fit, baseline.valid, n_init) for fit in tried]
-    best = min(range(len(tried)), key=lambda i: float(errors[i].mean()), default=None)
-    if best is None:
-        return None
-    gain = before - errors[best]
-    if not gain.mean() > max(WORTH_AN_ORDER * before.mean(), gain.std() / math.sqrt(len(gain))):
-        return None
-    return replace(baseline, estimate=_scaled(tried[best], records, channels, baseline.outputs))
-
-
-def _scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
+def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
     """Measure the scales of the signals that effects choose bounds by."""
     moved = _under_load(plain, records)
     problem = Problem(moved.plant, records, white(records.sizes))

@@ -136,8 +136,6 @@ class Plant:
         """Return the same plant with these terms, in the order in which signals pass them."""
         return replace(self, terms=tuple(sorted(terms, key=lambda term: (term.effect.place_in_chain, term.key))))
 
-    # ------------------------------------------------------------------ parameters
-
     @cached_property
     def layout(self) -> Layout:
         """Where each part of theta stands."""
@@ -257,8 +255,6 @@ class Plant:
             else:
                 carried[self.part_of(term)] = theta[smaller.part_of(term)]
         return carried, numbers
-
-    # ------------------------------------------------------------------ dynamics
 
     def on(self, port: str, channel: int = 0) -> list[Term]:
         """List the terms of a port, on one channel where it has several, in their order."""
