@@ -121,7 +121,7 @@ class Problem:
         def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
             with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
                 change = np.where(self._measured, (moved - here) / step, 0.0)
-            return self.noise.whiten(change).reshape(len(here), m)
+                return self.noise.whiten(change).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
         for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):

@@ -40,13 +40,16 @@ def test_a_joint_turns_into_a_rigid_drive_where_its_spring_is_hard():
         assert [d, k] == pytest.approx(rigid * (p + r) / r)  # both masses together
 
 
-@pytest.mark.parametrize(("rig", "seed"), [("joint_motor", 91), ("joint_link", 109)])
+@pytest.mark.parametrize(
+    ("rig", "seed"), [("joint_motor", 91), pytest.param("joint_link", 109, marks=pytest.mark.slow)]
+)
 def test_a_flexible_joint_is_no_lag_and_no_delay(rig, seed):
     joint, effects = identified(field.hide(rig, {}, noise=0.005, seed=seed))
     assert joint
     assert effects == []
 
 
+@pytest.mark.slow
 def test_the_delay_of_a_flexible_joint_is_seen():
     assert identified(field.hide("joint_link", {"input_delay": 1.0}, noise=0.005, seed=96)) == ("load", ["input_delay"])
 
