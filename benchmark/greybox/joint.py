@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from simgap.greybox import two_masses
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
@@ -13,7 +15,7 @@ from simgap.greybox.noise import schwarz_order
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import assess
+from simgap.greybox.trial import MATTERS, assess
 from simgap.records import Channels
 
 FEWEST_SAMPLES = 50  # of a record that may show how a joint swings
@@ -63,7 +65,11 @@ def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:
 
 
 def is_better(estimate: Estimate, joint: Baseline, rigid: Selection) -> bool:
-    """Tell whether the score of a drive with a joint is higher, under noise of one memory."""
+    """Tell whether a drive with a joint errs clearly less, and has the higher score under noise of one memory."""
+    chosen, noise = rigid.trial.estimate, rigid.baseline.noise
+    squares = [float(np.sum(noise.whiten(fit.errors) ** 2)) for fit in (estimate, chosen)]
+    if squares[0] > (1 - MATTERS) * squares[1]:
+        return False
     order = max(rigid.noise_order, schwarz_order(estimate.errors, joint.train.mask, joint.resolution))
     flexible = assess(joint, estimate, order)
-    return flexible.score > assess(rigid.baseline, rigid.trial.estimate, order).score + BETTER
+    return flexible.score > assess(rigid.baseline, chosen, order).score + BETTER
