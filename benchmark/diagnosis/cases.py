@@ -74,12 +74,18 @@ class CaseResult:
         return all(any(name in answer for answer in answers) for name in hidden)
 
 
+def room_of(rig: str) -> Any:
+    """Return the room that a rig stands in: the test rigs, or the machines in the field."""
+    from simgap.data.simulated import field, rigs
+
+    return field if rig in field.RIGS else rigs
+
+
 def solve(case: Case) -> CaseResult:
     """Make the data, fit the reference, diagnose. Raises whatever these raise."""
-    from simgap.data.simulated.rigs import hide
     from simgap.diagnosis.diagnose import diagnose
 
-    dataset = hide(case.rig, case.hidden(), case.noise, case.colour, case.seed)
+    dataset = room_of(case.rig).hide(case.rig, case.hidden(), case.noise, case.colour, case.seed)
     reference = known_effect_reference(dataset, tuple(case.hidden()))
     answer = diagnose(dataset, views_too=False)
     before, after = answer.findings.gain.before, answer.findings.gain.after

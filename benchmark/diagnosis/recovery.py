@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from simgap.diagnosis.cases import Case, CaseResult, solve
+from simgap.diagnosis.cases import Case, CaseResult, room_of, solve
 from simgap.records import Status, UnusableInput
 from simgap.results import lines, store
 from simgap.running.execution import Execution, carry_out
@@ -27,7 +27,7 @@ ROOMS = ("diagnosis", "error_views", "findings", "metrics", "greybox", "baseline
 @dataclass(frozen=True)
 class Grid:
     """The cases of a study: every effect on every rig that it suits with each strength, noise and colour, `pairs` of
-    two effects at once, and `clean` rigs with nothing hidden. No rigs: all of them.
+    two effects at once, and `clean` rigs with nothing hidden. No rigs: all test rigs; machines in the field by name.
     """
 
     rigs: tuple[str, ...] = ()
@@ -40,12 +40,17 @@ class Grid:
 
     def cases(self) -> Iterator[Case]:
         """All cases; the seed of a case depends on nothing but its place. Raises UnusableInput for an unknown rig."""
-        from simgap.data.simulated.rigs import RIGS, suitable
+        from simgap.data.simulated import field, rigs
 
-        chosen = self.rigs or tuple(RIGS)
+        known = (*rigs.RIGS, *field.RIGS)
+        chosen = self.rigs or tuple(rigs.RIGS)
         for rig in chosen:
-            if rig not in RIGS:
-                raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(RIGS)}")
+            if rig not in known:
+                raise UnusableInput(f"there is no rig called {rig!r}; known are {', '.join(known)}")
+
+        def suitable(rig: str, outside: bool = False) -> tuple[str, ...]:
+            return room_of(rig).suitable(rig, outside)
+
         for seed, rig in product(range(self.seeds), chosen):
             effects = (*suitable(rig), *suitable(rig, outside=True))
             for effect, strength, noise, colour in product(effects, self.strengths, self.noises, self.colours):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox import two_masses
 from simgap.greybox.levenberg import minimise
 from simgap.greybox.noise import Noise
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
@@ -83,6 +84,8 @@ class Problem:
                 local[:, i] = local[:, i + 1] * theta[i + 1] / rate
         elif plant.order:
             local[:, 0] = first[:, 0]
+            if plant.joint:
+                local[:, 2] = first[:, 0]
         return local
 
     def other_side(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
@@ -104,8 +107,8 @@ class Problem:
         sizes, high = self.sizes(theta), plant.high
         steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
         unit = 1.0 if plant.imposed else self._sizes[0]
-        starts = [DIFFERENCE * unit * (1.0 if plant.cascade or plant.imposed else plant.dt**-i)
-                  for i in range(plant.n_start)]  # fmt: skip
+        powers = [0 if plant.cascade or plant.imposed else i % 2 if plant.joint else i for i in range(plant.n_start)]
+        starts = [DIFFERENCE * unit * plant.dt**-power for power in powers]
         thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
@@ -118,7 +121,7 @@ class Problem:
         def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
             with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
                 change = np.where(self._measured, (moved - here) / step, 0.0)
-            return self.noise.whiten(change).reshape(len(here), m)
+                return self.noise.whiten(change).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
         for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):
@@ -142,7 +145,10 @@ class Problem:
         poles = np.abs(theta[layout.poles])
         slowest, speed = 1 / records.duration, 1.0
         natural = np.empty(len(poles))
-        for first in range(0, len(poles), 1 if plant.cascade else 2):
+        if plant.joint:
+            natural = two_masses.natural_sizes(poles, slowest)
+            speed = natural[1]
+        for first in range(0, 0 if plant.joint else len(poles), 1 if plant.cascade else 2):
             section = poles[first : first + (1 if plant.cascade else 2)]  # s + a, or s^2 + a1 s + a0
             rate = max(slowest, section[0], np.sqrt(section[-1]) if len(section) == 2 else 0.0)
             natural[first : first + len(section)] = [rate, rate * rate][: len(section)]

@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from simgap.greybox.fitting import Problem
+from simgap.greybox.joint import is_better, on_joint, with_joint
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant
+from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
 from simgap.greybox.position_and_velocity import with_kind, with_velocity
+from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.selection import Selection, select
 from simgap.records import Channels, TrainingSet
+
+STILL_FAR = 0.5  # of the readings that were left out: fewer, and they were never bad
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +42,10 @@ def identify(data: TrainingSet) -> list[Identified]:
     channels, experiments = with_velocity(data), data.train + data.valid
     identified = []
     for outputs in plants_of(channels):
-        if channels.outputs[outputs[0]].kind_from == "unknown":
-            settled = settle(data, channels, outputs[0])
-            selection = select(settled.baseline, settled.compared)
-        else:
-            settled = None
-            selection = select(find_baseline(data.train, data.valid, channels, outputs, data.n_init))
+        output = outputs[0]
+        settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
+        of_kind = with_kind(channels, output, settled.kind) if settled else channels
+        selection = _selected(data, of_kind, outputs, settled)
         plant = FittedPlant.fit(selection.trial.estimate, selection.baseline, experiments)
         identified.append(Identified(selection, plant, settled))
     return identified
@@ -52,3 +58,30 @@ def channels_of(identified: Sequence[Identified], data: TrainingSet) -> Channels
         if one.settled is not None:
             channels = with_kind(channels, one.selection.baseline.outputs[0], one.settled.kind)
     return channels
+
+
+def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
+    """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
+    rigid = _rigid(data, channels, outputs, settled)
+    joint = with_joint(rigid.baseline, channels, data.n_init)
+    if joint is None or not is_better(on_joint(joint, rigid.trial.estimate), joint, rigid):
+        return rigid
+    flexible = select(joint)
+    return flexible if is_better(flexible.trial.estimate, joint, rigid) else rigid
+
+
+def _rigid(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
+    """Select effects; again with every reading where those that were left out are not far off the chosen model.
+
+    The error of a model that knows no delay is large for one sample after every step, as that of a bad reading.
+    """
+    whole = data.train, data.valid, channels, outputs, data.n_init
+    selection = select(settled.baseline, settled.compared) if settled else select(find_baseline(*whole))
+    baseline, chosen = selection.baseline, selection.trial.estimate
+    if baseline.outliers and chosen.plant.terms:
+        records = Records.of(excerpts(data.train), outputs)
+        errors = Problem(chosen.plant, records, baseline.noise).errors(chosen.theta, chosen.local)
+        left_out = records.mask & ~baseline.train.mask
+        if np.mean(flag(errors, records.mask).any(axis=2)[left_out]) < STILL_FAR:
+            return select(find_baseline(*whole, every_reading=True))
+    return selection

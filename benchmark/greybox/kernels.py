@@ -78,7 +78,7 @@ def transition(a, h, e, g0, g1):  # noqa: PLR0912
 
 
 _loop = types.void(
-    _cube, _cube, _cube, _matrix, _cube, _cube, types.int64, types.float64,
+    _cube, _cube, _cube, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
     types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, types.float64[::1],
     types.float64[:, :, :, ::1],
 )  # fmt: skip
@@ -99,7 +99,7 @@ def dry_friction(v, new, gain, hold):
 
 @njit(_loop, cache=True, nogil=True)
 def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
-    es, g0s, g1s, rates, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
 
@@ -109,7 +109,7 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
     their role; until[role] counts those of this role and of the ones before.
     """
     _, experiments, samples, n = states.shape
-    entry, fast = n - 1, min(1, n - 1)
+    fast = min(1, n - 1)
     z, new, g0, g1, e = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
     for s in range(len(states)):
         p = thetas[s]
@@ -165,7 +165,7 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
 
 @njit(_loop, cache=True, nogil=True)
 def run_tanks(  # noqa: PLR0912 - as above
-    es, g0s, g1s, rates, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a cascade of tanks, as run_body does; forces act on the first one as inflows."""
     _, experiments, samples, n = states.shape
@@ -189,7 +189,7 @@ def run_tanks(  # noqa: PLR0912 - as above
                 for i in range(n):
                     flow[i] = 0.0
                 for q in range(until[FORCE]):
-                    flow[0] += terms[q](z[0], z[0], step * h, h, p, p_at[q], memory, m_at[q])
+                    flow[entry] += terms[q](z[0], z[0], step * h, h, p, p_at[q], memory, m_at[q])
                 for q in range(until[FRICTION], until[OUTFLOW]):
                     for i in range(n):
                         # In units of the last tank's level, so that one law serves tanks of any size.
@@ -199,7 +199,7 @@ def run_tanks(  # noqa: PLR0912 - as above
                         if i + 1 < n:
                             flow[i + 1] += out
                 for i in range(n):
-                    total = g0[i, 0] * u[step]
+                    total = g0[i, entry] * u[step]
                     for j in range(n):
                         total += e[i, j] * z[j]
                     for j in range(n):

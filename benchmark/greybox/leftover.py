@@ -46,7 +46,8 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     n, order = len(records.u), plant.order
     x, v = problem.simulator.motion(estimate.theta, estimate.local)  # [E, T]
     names, phi = library(plant, x, v, records.u)
-    plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs)
+    plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs,
+                  joint=plant.joint)  # fmt: skip
     simulator = Simulator(plain, np.ascontiguousarray(phi))
     theta = np.zeros(plain.size)
     for part in ("poles", "zeros", "velocity"):

@@ -27,12 +27,20 @@ BLOCKS = 20
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
 SMOOTH = 20.0
 EARLY = 0.25  # samples
+UNEXPLAINED = 0.5  # share of the output's variance
 
 
 def find_baseline(
-    train: Sequence[Experiment], valid: Sequence[Experiment], channels: Channels, outputs: Sequence[int], n_init: int
+    train: Sequence[Experiment],
+    valid: Sequence[Experiment],
+    channels: Channels,
+    outputs: Sequence[int],
+    n_init: int,
+    every_reading: bool = False,
 ) -> Baseline:
     """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput.
+
+    Single readings that are far off are left out, unless it is to be of `every_reading`.
 
     Held-out records are simulated from their first n_init samples, as the test will be.
     """
@@ -43,16 +51,15 @@ def find_baseline(
     kind = channels.outputs[outputs[0]].kind
     models = plain_models(records, held_out, kind, n_init)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
-    outliers = [] if stepped else find_outliers(models[-1].errors, records.mask, records.resolution)
+    outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
         models = plain_models(records, held_out, kind, n_init)
 
     def baseline_of(plain: Estimate) -> Baseline:
-        problem = Problem(plain.plant, records, white(records.sizes))
-        plant = replace(plain.plant, scales=scales_of(plain, problem, channels, outputs))
-        return Baseline(records, held_out, tuple(outputs), replace(plain, plant=plant), cut, tuple(outliers))
+        plain = scaled(plain, records, channels, outputs)
+        return Baseline(records, held_out, tuple(outputs), plain, cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
     to_beat = block_errors(baseline.estimate, baseline.valid, n_init).mean()
@@ -65,6 +72,26 @@ def find_baseline(
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
+
+
+def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
+    """Measure the scales of the signals that effects choose bounds by."""
+    moved = _under_load(plain, records)
+    problem = Problem(moved.plant, records, white(records.sizes))
+    return replace(plain, plant=replace(plain.plant, scales=scales_of(moved, problem, channels, outputs)))
+
+
+def _under_load(plain: Estimate, records: Records) -> Estimate:
+    """Fit a constant force too, where the model without one explains less than half of the output.
+
+    What a load carries away from an operating point that the model does not have says nothing of gain and forces.
+    """
+    before, sizes = plain.plant, records.sizes
+    left = np.mean((plain.errors[records.mask] / sizes) ** 2)
+    if left < UNEXPLAINED or before.offset or before.cascade or before.imposed or before.joint:
+        return plain
+    loaded = fit_plain(replace(before, offset=True, zeros=0, taps=(0,)), records)
+    return loaded if np.mean((loaded.errors[records.mask] / sizes) ** 2) < UNEXPLAINED * left else plain
 
 
 def _instead_of_order(term: Term, plant: Plant) -> bool:
@@ -132,7 +159,7 @@ def first_order_hold(held: Estimate, train: Records, valid: Records, n_init: int
 
 def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ...]) -> Estimate:
     before = held.plant
-    simple = before.cascade or before.two_outputs
+    simple = before.cascade or before.two_outputs or before.joint
     plant = replace(before, taps=taps, zeros=before.zeros if simple else before.order - 1)
     theta = np.zeros(plant.size)
     for name in ("poles", "offset", "velocity"):

@@ -10,6 +10,7 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
+from simgap.greybox import two_masses
 from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
 from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
@@ -86,6 +87,8 @@ class Plant:
 
     Cascade of tanks (level): x_i' = inflow - a_i x_i, each tank's outflow the next one's inflow, y = x_n.
 
+    A joint (`joint` says which side is measured): two masses of order 4, see `two_masses`; forces act on the motor.
+
     Order 0, a motion imposed on the machine and the force that it takes: y = b u + c1 b u' + d - forces(u, u').
     """
 
@@ -102,6 +105,7 @@ class Plant:
     taps: tuple[int, ...] = (0,)
     scales: PlantScales | None = None  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
+    joint: two_masses.Side = ""
 
     @property
     def ny(self) -> int:
@@ -119,6 +123,11 @@ class Plant:
         return self.order == 0
 
     @property
+    def force_order(self) -> int:
+        """The derivative of the position, or of the output, that forces change."""
+        return 2 if self.joint else self.order
+
+    @property
     def cascade(self) -> bool:
         """Whether the states are the levels of tanks in a row."""
         return self.kind == "level"
@@ -127,12 +136,11 @@ class Plant:
         """Return the same plant with these terms, in the order in which signals pass them."""
         return replace(self, terms=tuple(sorted(terms, key=lambda term: (term.effect.place_in_chain, term.key))))
 
-    # ------------------------------------------------------------------ parameters
-
     @cached_property
     def layout(self) -> Layout:
         """Where each part of theta stands."""
-        widths = [self.order, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs)]
+        poles = two_masses.WIDTH if self.joint else self.order
+        widths = [poles, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs)]
         widths += [0 if t in self.per_experiment else len(self.parameters_of(t)) for t in self.terms]
         slices = [slice(end - width, end) for width, end in zip(widths, accumulate(widths), strict=True)]
         return Layout(*slices[:5], terms=tuple(slices[5:]))
@@ -195,8 +203,9 @@ class Plant:
         # A tank that is much faster than the sampling is no tank; of anything else, no speed would show.
         fastest = (FASTEST_TANK if self.cascade else FASTEST) / self.dt
         squared = [not self.cascade and i % 2 == 1 for i in range(self.order)]  # the a0 of each s^2 + a1 s + a0
-        linear = [Parameter(f"a{i}", "", 0.0, fastest ** (1 + square)) for i, square in enumerate(squared)]
-        if self.order == 2 and any(term.effect.replaces_spring for term in self.terms):
+        powers = two_masses.POWERS if self.joint else [1 + square for square in squared]
+        linear = [Parameter(f"a{i}", "", 0.0, fastest**power) for i, power in enumerate(powers)]
+        if (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
             linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
         linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]
         linear += [Parameter("d", "", -inf, inf)] * self.offset
@@ -247,8 +256,6 @@ class Plant:
                 carried[self.part_of(term)] = theta[smaller.part_of(term)]
         return carried, numbers
 
-    # ------------------------------------------------------------------ dynamics
-
     def on(self, port: str, channel: int = 0) -> list[Term]:
         """List the terms of a port, on one channel where it has several, in their order."""
         return [t for t in self.terms if t.effect.port == port and (port == "force" or t.channel == channel)]
@@ -261,6 +268,8 @@ class Plant:
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """Return A of z' = A z + (inputs and forces)."""
         sections, n = theta[self.layout.poles], self.order
+        if self.joint:
+            return two_masses.matrix(sections)
         if self.cascade:
             return np.diag(-sections) + np.diag(sections[:-1], -1)
         polynomial = np.ones(1)
@@ -278,10 +287,11 @@ class Plant:
         if self.cascade:
             c[0, -1] = 1.0
             return c
-        c[0, 0] = 1.0
+        at = two_masses.MEASURED[self.joint]
+        c[0, at] = 1.0
         c[0, 1 : 1 + self.zeros] = theta[self.layout.zeros]
         if self.two_outputs:
-            c[1, 1] = theta[self.layout.velocity][0]
+            c[1, at + 1] = theta[self.layout.velocity][0]
         return c
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, combinations_with_replacement
 
 import numpy as np
@@ -16,14 +16,20 @@ FINALISTS = 2
 LARGEST_RATIO = 1e6
 
 
-def fit_plain(plant: Plant, records: Records, smaller: Estimate | None = None) -> Estimate:
+def fit_plain(
+    plant: Plant, records: Records, smaller: Estimate | None = None, shapes: Sequence[list[float]] | None = None
+) -> Estimate:
     """Fit a plain linear model from the best poles of a grid, or from those of a smaller model and one more."""
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
     tried = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
     linear = np.zeros(plant.size, dtype=bool)
     linear[plant.layout.gains] = linear[plant.layout.offset] = True
-    for shape in denominator_grid(plant, records) if smaller is None else larger_denominators(plant, records, smaller):
+    if shapes is None:
+        shapes = list(
+            denominator_grid(plant, records) if smaller is None else larger_denominators(plant, records, smaller)
+        )
+    for shape in shapes:
         theta = np.zeros(plant.size)
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0

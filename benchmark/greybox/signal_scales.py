@@ -24,7 +24,9 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     x, v = (signal[records.mask] for signal in problem.simulator.motion(estimate.theta, estimate.local))  # [N]
     drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     # What would move the output by its size within the longest record, where the input does nothing.
-    force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (1 if plant.cascade else plant.order)
+    force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (
+        1 if plant.cascade else plant.force_order
+    )
     size = float(records.sizes[0])
     x_max = float(np.max(np.abs(x))) or size
     v_max = float(np.max(np.abs(v))) or size / records.duration
@@ -32,7 +34,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     def scales(i: int, j: int) -> SignalScales:
         u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
         return SignalScales(
-            kind=plant.kind, order=plant.order, dt=plant.dt, duration=records.duration,
+            kind=plant.kind, order=plant.force_order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
             x_max=x_max, v_max=v_max, stroke=x_max if plant.order != 1 else _stroke(x, v_max, records),

@@ -13,6 +13,7 @@ from numba import cfunc
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body_directly, run_tanks_directly, transition
 from simgap.greybox.plant import Plant
+from simgap.greybox.two_masses import ENTRY
 
 ROLES = get_args(Role)  # as the kernels number them
 
@@ -79,11 +80,11 @@ class Simulator:
                 continue
             a = plant.matrix(theta)
             transition(a, self.h, e[i], g0[i], g1[i])
-            rates[i] = -np.diag(a) if plant.cascade else -a[-1]
+            rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
         states = np.empty((s, experiments, samples, n))
-        run = run_tanks_directly if plant.cascade else run_body_directly
+        run, entry = (run_tanks_directly, 0) if plant.cascade else (run_body_directly, ENTRY if plant.joint else n - 1)
         run(
-            e, g0, g1, rates, np.stack([self.drive(theta) for theta in thetas]), np.ascontiguousarray(starts),
+            e, g0, g1, rates, entry, np.stack([self.drive(theta) for theta in thetas]), np.ascontiguousarray(starts),
             self.substeps, self.h, self._terms, self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at,
             self._memory, states,
         )  # fmt: skip

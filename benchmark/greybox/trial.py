@@ -115,9 +115,12 @@ def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
 def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether the larger model simulates held-out data better, in most of them."""
     if larger.k_valid > smaller.k_valid:
-        # Estimated anew there, so the gain must pay for that.
+        # Estimated anew there, so the gain must pay for that; and so in training, counted in independent samples:
+        # a line through what wanders slowly seems certain, but takes little of it (Durlauf and Phillips 1988).
         price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.mask.shape[1])
-        return larger.valid - smaller.valid - price > HELD_OUT
+        paid = 0.5 * (larger.k_train - smaller.k_train) * math.log(baseline.train.mask.shape[1])
+        straight = free_run_ratio(baseline, smaller, larger) > paid
+        return straight and larger.valid - smaller.valid - price > HELD_OUT
     # One simulation that grows without bound must not outweigh all other blocks.
     most = WORST * baseline.squares_of_mean / len(smaller.blocks)
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)

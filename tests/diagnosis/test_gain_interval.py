@@ -102,6 +102,13 @@ def test_a_gain_in_every_part_of_the_record_is_believed():
     assert share_with_interval(1.5 * noise, noise, whole(600))[1] > 0.1
 
 
+def test_where_every_block_gains_much_the_interval_lies_above_zero_though_one_of_them_holds_what_is_left():
+    noise = white(np.random.default_rng(8), 1200)
+    left = np.full(1200, 0.002)
+    left[1050:] = 0.15  # one block of eight, which gained least
+    assert share_with_interval(noise, left * noise, whole(300, 300, 300, 300))[1] > 0
+
+
 def test_models_that_err_alike_gain_exactly_nothing():
     losses = white(np.random.default_rng(6), 300)
     assert share_with_interval(losses, losses, whole(100, 200)) == (0.0, 0.0, 0.0)

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from simgap.data.simulated.field import hide
+from simgap.diagnosis.diagnose import diagnose
+
 from .building import plain_errors, plain_search
 from .parts import experiments, measured_without_outliers, outliers_flagged, outliers_found
 from .plants import free_run, steps, velocity
@@ -109,3 +112,8 @@ def test_a_search_fits_its_plain_model_to_the_rest():
     assert len(rest) == 600 - off[:3].sum()
     # The spread of N errors is known to 1 / sqrt(2 N); four of that.
     assert rest.std() == pytest.approx(0.02, rel=4 / np.sqrt(2 * len(rest)))
+
+
+def test_errors_of_a_delay_after_each_step_of_a_loop_are_no_outliers():
+    answer = diagnose(hide("speed_loop", {"input_delay": 0.25}, noise=0.05, seed=14), views_too=False)
+    assert [cause.effect for cause in answer.causes] == ["input_delay"]

@@ -1,0 +1,51 @@
+"""What the machines are asked for: set points of a controller, or inputs; and the slow disturbance."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy.random import Generator
+from scipy.signal import lfilter
+
+from simgap.data.simulated.field.machines import Plant
+
+
+def draw_wanted(plant: Plant, number: int, samples: int, rng: Generator) -> Float[np.ndarray, "T nu"]:
+    """Draw steps, sines or ramps by turns, of an amplitude of their own, about the operating point."""
+    shapes = (_steps, _sines, _ramps)
+    columns = [shapes[(number + i) % 3](samples, rng) * rng.uniform(0.6, 1.0) for i in range(len(plant.scale))]
+    return np.array(plant.middle) + np.array(plant.scale) * np.stack(columns, axis=1)
+
+
+def _steps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
+    """Draw levels within 1, each held for 6 to 40 samples, without a mean."""
+    holds = rng.integers(6, 41, samples // 6)
+    levels = np.repeat(rng.uniform(-1.0, 1.0, len(holds)), holds)[:samples]
+    return levels - levels.mean()
+
+
+def _sines(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
+    """Add five sines with periods of 12 to 120 samples; the largest value is 1."""
+    periods = np.geomspace(12, 120, 5) * rng.uniform(0.85, 1.15, 5)
+    waves = np.sin(2 * np.pi * (np.arange(samples)[:, None] / periods + rng.random(5))).sum(axis=1)
+    return waves / np.abs(waves).max()
+
+
+def _ramps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
+    """Draw ramps to and fro between turning points of either sign, 15 to 50 samples apart."""
+    turns = np.cumsum(rng.integers(15, 51, samples // 15 + 2)) - 15
+    peaks = rng.uniform(0.4, 1.0, len(turns)) * (-1.0) ** (np.arange(len(turns)) + rng.integers(2))
+    return np.interp(np.arange(samples), turns, peaks)
+
+
+def slow_disturbance(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:
+    """Add three sines with periods of 0.7 to 3 records; of standard deviation about 1 over many records."""
+    cycles, phases = 1 / rng.uniform(0.7, 3.0, 3), rng.random(3)
+    return np.sin(2 * np.pi * (np.arange(samples)[:, None] / samples * cycles + phases)).sum(axis=1) / np.sqrt(1.5)
+
+
+def coloured_noise(samples: int, colour: float, rng: Generator) -> Float[np.ndarray, " T"]:
+    """Draw AR(1) noise of standard deviation 1."""
+    draws = rng.standard_normal(samples)
+    draws[1:] *= np.sqrt(1 - colour**2)
+    return lfilter([1.0], [1.0, -colour], draws)
