@@ -12,9 +12,10 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
-from simgap.greybox.evidence import Evidence, intervals
+from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.identification import Identified, identify
+from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.samples import Records
 from simgap.greybox.score_test import add, jacobian_of, score

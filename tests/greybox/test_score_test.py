@@ -58,7 +58,7 @@ def test_the_score_of_an_effect_that_is_there_is_what_a_refit_gains(effect, size
     assert np.vdot(plain_errors(search), plain_errors(search)) == pytest.approx(np.vdot(without, without), rel=1e-5)
     assert score == pytest.approx(gain, rel=0.05)
     assert values[0] == pytest.approx(parameters[2], rel=0.05)
-    assert gain_of_refit(search, effect) == pytest.approx(gain, rel=1e-3)
+    assert gain_of_refit(search, effect) == pytest.approx(gain, abs=0.05)  # as closely as the search fits
 
 
 def test_where_no_load_is_the_score_is_that_of_one_parameter_too_many():
