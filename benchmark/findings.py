@@ -189,6 +189,7 @@ class Findings:
     offers: tuple[Offer, ...] = ()
     traces: tuple[Trace, ...] = ()
     seed: int = 0
+    linear: dict[str, Any] | None = None  # as baseline: the linear model of any order, where it does as well as effects
     suspects: tuple[Cause, ...] = ()  # in the place of causes, or beside them
 
     @property
@@ -203,6 +204,7 @@ class Findings:
             "dataset": self.dataset,
             "verdict": self.verdict,
             "baseline": self.baseline,
+            "linear": self.linear,
             "wrong": [
                 {"view": w.label, "output": w.output, "share": w.share, "chance": w.chance, "text": w.text}
                 for w in self.wrong

@@ -15,7 +15,7 @@ from simgap.error_views.views import views
 from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
-from simgap.greybox.identification import channels_of, identify
+from simgap.greybox.identification import Identified, channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
 from simgap.metrics import is_finite, relative, spread
@@ -77,6 +77,7 @@ def diagnose(
         dataset=dataset.name,
         verdict=verdict,
         baseline=_baseline(plain, dataset, before),
+        linear=_linear(identified, dataset),
         wrong=_wrong(plain, dataset, seed) if views_too else (),
         causes=promised.causes if promised else (),
         runner_up=_runner_up(trusted) if promised else None,
@@ -103,6 +104,7 @@ def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
     training = dataset.training
     said = [doubts.shows_controller((*training.train, *training.valid), dataset.channels)]
     said += [doubts.beaten_by_mean(plant.selection, dataset.channels) for plant in evidence]
+    said += [doubts.beaten_by_order(plant.identified, dataset.channels) for plant in evidence]
     return tuple(sentence for sentence in said if sentence)
 
 
@@ -127,6 +129,14 @@ def _baseline(plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray
         fit[channel.name] = relative(error, std)["fit_percent"] if std else math.nan
     orders = plain.fitted["order"]
     return {"order": orders[0] if len(orders) == 1 else orders, "rmse": rmse, "fit_percent": fit}
+
+
+def _linear(identified: Sequence[Identified], dataset: Dataset) -> dict[str, Any] | None:
+    """Describe the best linear models as the plain ones, where any of them does better."""
+    if not any(one.linear for one in identified):
+        return None
+    model = GreyBoxModel([one.plant if one.linear else one.plain for one in identified])
+    return _baseline(model, dataset, [gains.free_run(model, x, dataset.n_init) for x in dataset.test])
 
 
 def _wrong(plain: GreyBoxModel, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:

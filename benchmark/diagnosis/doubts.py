@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.identification import Identified
 from simgap.greybox.selection import Selection
 from simgap.records import Channels, Experiment
 
@@ -38,6 +39,20 @@ def shows_controller(experiments: Sequence[Experiment], channels: Channels) -> s
                     "test signal to it, and record again."
                 )
     return None
+
+
+def beaten_by_order(one: Identified, channels: Channels) -> str | None:
+    """Tell in a sentence that a linear model of another order needs no effect to do as well."""
+    if one.linear is None:
+        return None
+    selection = one.selection
+    name, plain = channels.outputs[selection.baseline.outputs[0]].name, selection.baseline.plant
+    effects = [term.effect.title for term in selection.trial.terms]
+    helped = f" with {' and '.join(effects)}" if effects else ""
+    return (
+        f"A linear model of order {one.linear.plant.order} simulates held-out {name} at least as well as the plain one "
+        f"of order {plain.order}{helped}, so that no effect can be held responsible for what is wrong."
+    )
 
 
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:

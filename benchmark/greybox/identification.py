@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Problem
 from simgap.greybox.joint import is_better, on_joint, with_joint
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
+from simgap.greybox.linear_rival import linear_rival
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
@@ -24,11 +26,15 @@ STILL_FAR = 0.5  # of the readings that were left out: fewer, and they were neve
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What was found about one plant: the selection of its effects, and the plant fitted to all training data."""
+    """What was found about one plant: the selection of its effects, and the plant fitted to all training data.
+
+    Where the effects do no better than a linear model of another order, the plant is that one.
+    """
 
     selection: Selection
     plant: FittedPlant
     settled: Settled | None = None  # what its output is, where nobody had said it
+    linear: Baseline | None = None  # the linear model that does as well
 
     @property
     def plain(self) -> FittedPlant:
@@ -46,8 +52,9 @@ def identify(data: TrainingSet) -> list[Identified]:
         settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
         selection = _selected(data, of_kind, outputs, settled)
-        plant = FittedPlant.fit(selection.trial.estimate, selection.baseline, experiments)
-        identified.append(Identified(selection, plant, settled))
+        linear = linear_rival(data, of_kind, selection)
+        best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
+        identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
     return identified
 
 

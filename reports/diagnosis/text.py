@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from typing import Any
 
 from simgap.findings import Cause, Findings
 from simgap.reports.diagnosis import numbers, words
@@ -20,7 +21,8 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
     """
     paragraphs = [
         *_wrapped(f"{findings.dataset}: {words.headline(findings)}", width),
-        *_section("Plain linear model", _baseline(findings), width),
+        *_section("Plain linear model", _linear(findings.baseline, findings), width),
+        *_section("Best linear model", list(_linear(findings.linear, findings)) if findings.linear else [], width),
         *_section("What it gets wrong", _wrong(findings), width),
     ]
     for called, causes in (("Cause", findings.causes), ("Suspect", findings.suspects)):
@@ -54,11 +56,10 @@ def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     )
 
 
-def _baseline(findings: Findings) -> Iterator[str]:
-    plain = findings.baseline
-    yield f"order {words.orders(plain.get('order', 'unknown'))}"
-    for name, rmse in plain.get("rmse", {}).items():
-        fit = numbers.fit(plain.get("fit_percent", {}).get(name, float("nan")))
+def _linear(model: dict[str, Any], findings: Findings) -> Iterator[str]:
+    yield f"order {words.orders(model.get('order', 'unknown'))}"
+    for name, rmse in model.get("rmse", {}).items():
+        fit = numbers.fit(model.get("fit_percent", {}).get(name, float("nan")))
         yield f"{name}: free-run RMSE {amount(rmse, findings.units.get(name, ''))}, fit {fit}"
 
 

@@ -1,0 +1,39 @@
+"""The best linear model of any order beside the plant that an output's kind asks for, with its effects."""
+
+from __future__ import annotations
+
+import math
+
+from simgap.greybox.baseline import Baseline
+from simgap.greybox.linear import WORTH_AN_ORDER, block_errors, find_baseline
+from simgap.greybox.position_and_velocity import with_kind
+from simgap.greybox.selection import Selection
+from simgap.greybox.trial import CONSISTENT
+from simgap.records import Channels, TrainingSet
+
+# Of what linear effects take of the error: what a free linear model may take beyond them.
+BEYOND = 0.1
+
+
+def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> Baseline | None:
+    """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
+
+    What is nonlinear must simulate held-out data better than that. A lag or a delay is a linear model itself, of few
+    parameters, and is believed as long as more of them hardly help. None too for an output that is no motion and no
+    level, whose plain model is this one already, and where effects are of single experiments and cannot be forecast.
+    """
+    plain, chosen = selection.baseline, selection.trial.estimate
+    if plain.plant.kind == "other" or len(plain.outputs) > 1 or chosen.plant.per_experiment:
+        return None
+    whole = data.train, data.valid, with_kind(channels, plain.outputs[0], "other"), plain.outputs, data.n_init
+    linear = find_baseline(*whole, every_reading=not plain.outliers)
+    with_effects, without, of_linear = (
+        block_errors(fit, plain.valid, data.n_init) for fit in (chosen, plain.estimate, linear.estimate)
+    )
+    gain = with_effects - of_linear
+    error = gain.std() / math.sqrt(len(gain))
+    # What the readings show needs no better simulation.
+    if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
+        better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
+        return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
+    return None if -gain.mean() > CONSISTENT * error else linear

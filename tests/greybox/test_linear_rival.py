@@ -1,0 +1,55 @@
+"""No effect is named where a linear model of another order does as well; a delay is believed while it is nearly it."""
+
+import numpy as np
+import pytest
+
+from simgap.data.simulated import field, rigs
+from simgap.diagnosis.diagnose import diagnose
+from simgap.greybox.identification import identify
+
+
+@pytest.fixture(scope="module")
+def joint():
+    """A motor behind a flexible joint, which swings; nothing else is wrong with it."""
+    return field.hide("joint_link", {}, 0.005, 0.8, 105015)
+
+
+def test_a_joint_that_swings_is_a_matter_of_order_and_no_delay(joint):
+    (one,) = identify(joint.training)
+    assert one.linear is not None
+    assert one.linear.plant.order > one.selection.baseline.plant.order
+    # The fitted model is the linear one.
+    assert one.plant.estimate.plant.order == one.linear.plant.order
+    assert one.plant.estimate.plant.terms == ()
+
+
+def test_the_first_sentence_says_that_order_does_as_well_and_the_answer_shows_that_model(joint):
+    answer = diagnose(joint, views_too=False)
+    assert answer.verdict == "nothing_found"
+    assert answer.causes == answer.suspects == ()
+    said = " ".join(str(answer).split())
+    assert "Nothing is named. A linear model of order 4 simulates held-out angle at least as well" in said
+    assert "Best linear model order 4" in said
+    told = answer.to_json()
+    assert told["linear"]["order"] == 4
+    n = joint.n_init
+    runs = [answer.model.simulate(x.u[None], x.y[None, :n])[0] for x in joint.test]
+    rmse = np.sqrt(np.mean(np.concatenate([run - x.y[n:] for run, x in zip(runs, joint.test, strict=True)]) ** 2))
+    assert told["linear"]["rmse"]["angle"] == pytest.approx(rmse)
+    assert rmse < 0.5 * told["baseline"]["rmse"]["angle"]
+
+
+@pytest.mark.parametrize(
+    ("rig", "effects"),
+    [("cart", {"coulomb_friction": 0.5}), ("cart", {"actuator_lag": 0.5}), ("slide", {"input_delay": 0.5})],
+)
+def test_an_effect_that_is_there_is_not_beaten(rig, effects):
+    data = rigs.hide(rig, effects, noise=0.05, seed=3)
+    (one,) = identify(data.training)
+    assert one.linear is None
+    assert one.selection.trial.names == tuple(effects)
+
+
+def test_where_effects_do_better_the_answer_shows_no_other_linear_model():
+    answer = diagnose(rigs.hide("cart", {"coulomb_friction": 1.0}, noise=0.05, seed=3), views_too=False)
+    assert answer.to_json()["linear"] is None
