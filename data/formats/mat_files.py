@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +15,21 @@ from jaxtyping import Float
 from simgap.data.formats.headings import find, listed
 from simgap.data.formats.tables import Table
 from simgap.records import UnusableInput
+
+# SciPy raises what it likes at a broken file; NotImplementedError is for version 7.3.
+READ = """
+import pickle, sys, warnings
+from scipy.io import loadmat
+warnings.simplefilter("ignore")
+try:
+    held = {name: value for name, value in loadmat(sys.argv[1]).items() if not name.startswith("__")}
+    answer = {name: value for name, value in held.items() if value.dtype.kind in "fiu"}
+except NotImplementedError:
+    answer = None
+except Exception as error:
+    answer = str(error) or type(error).__name__
+pickle.dump(answer, sys.stdout.buffer)
+"""
 
 
 def read_mat(path: Path, wanted: Sequence[str]) -> Table:
@@ -37,15 +55,14 @@ def read_mat(path: Path, wanted: Sequence[str]) -> Table:
 
 
 def _arrays(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    try:
-        held = loadmat(path)
-        return {name: value for name, value in held.items() if not name.startswith("__")}
-    except NotImplementedError:
-        return _arrays_of_7_3(path)
-    except Exception as error:  # SciPy raises what it likes at a broken file
-        raise _broken(path, error) from None
+    """Read all arrays, in a process of its own: the compiled reader crashes on some broken files."""
+    ran = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, check=False)
+    if ran.returncode:
+        raise _broken(path, "its content makes no sense")
+    answer = pickle.loads(ran.stdout)
+    if isinstance(answer, str):
+        raise _broken(path, answer)
+    return _arrays_of_7_3(path) if answer is None else answer
 
 
 def _arrays_of_7_3(path: Path) -> dict[str, Any]:
@@ -59,11 +76,11 @@ def _arrays_of_7_3(path: Path) -> dict[str, Any]:
         with h5py.File(path) as file:
             return {name: np.asarray(held) for name, held in file.items() if isinstance(held, h5py.Dataset)}
     except Exception as error:  # h5py raises what it likes at a broken file
-        raise _broken(path, error) from None
+        raise _broken(path, str(error)) from None
 
 
-def _broken(path: Path, error: Exception) -> UnusableInput:
-    why = " ".join(str(error).split())[:200]
+def _broken(path: Path, error: str) -> UnusableInput:
+    why = " ".join(error.split())[:200]
     return UnusableInput(f"{path} cannot be read as a MATLAB file ({why}); save it anew with '-v7'")
 
 

@@ -96,7 +96,7 @@ def test_a_broken_matlab_file_of_version_7_3_is_refused(matlab_7_3, refused):
     assert "cannot be read as a MATLAB file" in refused(matlab_7_3, ["u"], ["y"])
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.floats(0, 1), piece=st.binary(max_size=20), cut=st.booleans())
 def test_a_broken_matlab_file_is_loaded_or_refused_in_one_line(mat, at, piece, cut):
     file = mat({name: values[:20] for name, values in RECORD.items()})
@@ -107,6 +107,11 @@ def test_a_broken_matlab_file_is_loaded_or_refused_in_one_line(mat, at, piece, c
         assert isinstance(load(file, ["u"], ["y"], dt=0.1), Dataset)
     except UnusableInput as error:
         assert len(str(error).splitlines()) == 1
+
+
+def test_a_matlab_file_on_which_the_reader_crashes_is_refused(mat, refused, monkeypatch):
+    monkeypatch.setattr("simgap.data.formats.mat_files.READ", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    assert "cannot be read as a MATLAB file" in refused(mat(RECORD), ["u"], ["y"])
 
 
 def test_parquet_without_pyarrow_is_refused_with_a_remedy(tmp_path, refused, monkeypatch):
