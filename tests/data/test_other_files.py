@@ -1,6 +1,7 @@
 """MATLAB and Parquet files: the record that a CSV file would hold, or one sentence."""
 
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -107,6 +108,15 @@ def test_a_broken_matlab_file_is_loaded_or_refused_in_one_line(mat, at, piece, c
         assert isinstance(load(file, ["u"], ["y"], dt=0.1), Dataset)
     except UnusableInput as error:
         assert len(str(error).splitlines()) == 1
+
+
+def test_a_matlab_file_that_crashed_the_reader_is_loaded_or_refused(mat):
+    file = mat({"t": np.arange(20.0) * 0.1, "u": np.arange(20.0), "y": np.arange(20.0) ** 2})
+    content = file.read_bytes()
+    for tail in (b"", content[397:]):
+        file.write_bytes(content[:392] + bytes.fromhex("ffff010001") + tail)
+        with suppress(UnusableInput):
+            assert isinstance(load(file, ["u"], ["y"]), Dataset)
 
 
 def test_a_matlab_file_on_which_the_reader_crashes_is_refused(mat, refused, monkeypatch):
