@@ -59,8 +59,9 @@ def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
 def _linear(model: dict[str, Any], findings: Findings) -> Iterator[str]:
     yield f"order {words.orders(model.get('order', 'unknown'))}"
     for name, rmse in model.get("rmse", {}).items():
-        fit = numbers.fit(model.get("fit_percent", {}).get(name, float("nan")))
-        yield f"{name}: free-run RMSE {amount(rmse, findings.units.get(name, ''))}, fit {fit}"
+        percents = model.get("fit_percent", {}).get(name, float("nan"))
+        remark = ": the mean is a better guess" if percents < 0 else ""
+        yield f"{name}: free-run RMSE {amount(rmse, findings.units.get(name, ''))}, fit {numbers.fit(percents)}{remark}"
 
 
 def _wrong(findings: Findings) -> list[str]:

@@ -192,3 +192,9 @@ def test_suspects_beside_a_cause_are_said_after_it(named):
     assert "Suspected besides, not shown: backlash." in text
     assert text.index("Cause 1: Coulomb friction") < text.index("Suspect 1: backlash") < text.index("To decide: Push")
     assert "with the suspects" not in text
+
+
+def test_a_model_that_is_worse_than_the_mean_is_said_to_be(named):
+    worse = replace(named, baseline=named.baseline | {"fit_percent": {"x": -192.1}})
+    assert "fit -192.1 %: the mean is a better guess" in in_one_line(diagnosis_text(worse))
+    assert "better guess" not in diagnosis_text(named)
