@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from shlex import quote
 
 from simgap.findings import Cause, Separation
 from simgap.greybox.identification import Identified
@@ -31,7 +32,7 @@ def _taken_for(channel: Channel, as_well: Sequence[Kind]) -> str:
     if channel.kind == "other":
         return (
             f"Nobody says what {channel.name} is, and the records do not show a position, a velocity or a level: where "
-            f"it is one, say so with --kind {channel.name}=position, velocity or level."
+            f"it is one, say so with --kind {quote(channel.name)}=position, velocity or level."
         )
     claims = [CALLED[kind] for kind in as_well if kind != "other"]
     why = (
@@ -41,7 +42,7 @@ def _taken_for(channel: Channel, as_well: Sequence[Kind]) -> str:
     )
     return (
         f"{channel.name} is taken as {CALLED[channel.kind]}, {why}: where it is anything else, say so with "
-        f"--kind {channel.name}=position, velocity, level or other."
+        f"--kind {quote(channel.name)}=position, velocity, level or other."
     )
 
 
@@ -55,7 +56,7 @@ def undecided(identified: Sequence[Identified], channels: Channels) -> tuple[str
             listed = " and ".join(f"as {CALLED[kind]} it has {effect.title}" for kind, effect in rivals)
             sentences.append(
                 f"What {name} is decides the answer, and the records do not show it: {listed}. Say what it is with "
-                f"--kind {name}=position, velocity, level or other."
+                f"--kind {quote(name)}=position, velocity, level or other."
             )
     return tuple(sentences)
 
