@@ -76,15 +76,14 @@ def share_with_interval(
     m = len(starts)
     mean_length = len(d) / m
     variance = m / max(1, m - 1) * np.sum(np.add.reduceat(d, starts) ** 2) / len(d) ** 2
-    if m > len(lengths):
-        variance /= 1 - min(0.5, 0.5 * tau / mean_length)
+    correction = 1 - min(0.5, 0.5 * tau / mean_length) if m > len(lengths) else 1.0
+    variance /= correction
     w = np.add.reduceat(relative.mean(axis=0), starts)
     freedom = max(1.0, w.sum() ** 2 / np.sum(w**2) - 1)
     reach = student.ppf(0.975, freedom) * math.sqrt(variance) if m > 1 else math.inf
     ratio = math.log(after.mean() / before.mean())
     share, low, high = (1 - math.exp(0.5 * min(ratio + r, LARGEST_EXPONENT)) for r in (0.0, reach, -reach))
     if low <= 0 < share and m > 1:
-        correction = 1 - min(0.5, 0.5 * tau / mean_length) if m > len(lengths) else 1.0
         low = max(low, _least_share(before, after, starts, correction))
     return share, low, high
 

@@ -30,9 +30,12 @@ class Outliers:
 
 def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
     """Flag readings whose error stands out from the median of the five around it."""
-    off = _off(errors, mask)
-    flags = np.zeros(errors.shape, dtype=bool)
-    for j in range(errors.shape[2]):
+    return _far(_off(errors, mask), mask)
+
+
+def _far(off: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
+    flags = np.zeros(off.shape, dtype=bool)
+    for j in range(off.shape[2]):
         deviation = 1.4826 * np.median(np.abs(off[:, :, j][mask]))
         if deviation > 0:
             flags[:, :, j] = (np.abs(off[:, :, j]) > FAR * deviation) & mask
@@ -59,7 +62,8 @@ def find_outliers(
     (Lange, Little, Taylor 1989), and no reading is bad. `resolution` is the smallest error of each output that means
     anything.
     """
-    flags, off = flag(errors, mask), _off(errors, mask)
+    off = _off(errors, mask)
+    flags = _far(off, mask)
     least = np.broadcast_to(resolution, errors.shape[2:])
     outliers = []
     for j in range(errors.shape[2]):
