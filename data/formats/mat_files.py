@@ -55,8 +55,11 @@ def read_mat(path: Path, wanted: Sequence[str]) -> Table:
 
 
 def _arrays(path: Path) -> dict[str, Any]:
-    """Read all arrays, in a process of its own: the compiled reader crashes on some broken files."""
-    ran = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, check=False)
+    """Read all arrays, in a process of its own: the compiled reader crashes on some broken files.
+
+    With -P no module of the folder that it is called in stands in the place of one that it imports.
+    """
+    ran = subprocess.run([sys.executable, "-P", "-c", READ, str(path)], capture_output=True, check=False)
     if ran.returncode:
         raise _broken(path, "its content makes no sense")
     answer = pickle.loads(ran.stdout)
