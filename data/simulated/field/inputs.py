@@ -8,6 +8,7 @@ from numpy.random import Generator
 from scipy.signal import lfilter
 
 from simgap.data.simulated.field.machines import Plant
+from simgap.data.simulated.signals import ramps, sines, steps
 
 
 def draw_wanted(plant: Plant, number: int, samples: int, rng: Generator) -> Float[np.ndarray, "T nu"]:
@@ -18,24 +19,16 @@ def draw_wanted(plant: Plant, number: int, samples: int, rng: Generator) -> Floa
 
 
 def _steps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Draw levels within 1, each held for 6 to 40 samples, without a mean."""
-    holds = rng.integers(6, 41, samples // 6)
-    levels = np.repeat(rng.uniform(-1.0, 1.0, len(holds)), holds)[:samples]
+    levels = steps(samples, 6, 40, rng)
     return levels - levels.mean()
 
 
 def _sines(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Add five sines with periods of 12 to 120 samples; the largest value is 1."""
-    periods = np.geomspace(12, 120, 5) * rng.uniform(0.85, 1.15, 5)
-    waves = np.sin(2 * np.pi * (np.arange(samples)[:, None] / periods + rng.random(5))).sum(axis=1)
-    return waves / np.abs(waves).max()
+    return sines(samples, 120, 5, rng)
 
 
 def _ramps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Draw ramps to and fro between turning points of either sign, 15 to 50 samples apart."""
-    turns = np.cumsum(rng.integers(15, 51, samples // 15 + 2)) - 15
-    peaks = rng.uniform(0.4, 1.0, len(turns)) * (-1.0) ** (np.arange(len(turns)) + rng.integers(2))
-    return np.interp(np.arange(samples), turns, peaks)
+    return ramps(samples, 15, 50, rng)
 
 
 def slow_disturbance(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:

@@ -13,7 +13,8 @@ from simgap.data.simulated.field.inputs import coloured_noise, draw_wanted, slow
 from simgap.data.simulated.field.kernels import Actuator, Machine, run
 from simgap.data.simulated.field.machines import RIGS, Plant
 from simgap.data.simulated.field.sizes import apply, largest_angle, suitable
-from simgap.records import Dataset, Experiment, TrainingSet
+from simgap.data.simulated.signals import in_splits
+from simgap.records import Dataset, Experiment
 
 COUNTS = (8, 4, 4)  # experiments to train, validate and test on
 SAMPLES = 300
@@ -53,10 +54,7 @@ def hide(
     u, y = bench.record(*apply(plant, hidden, u[..., channel], y, channel, jump), spread)
     y = y + spread * bench.noise
     records = [Experiment(f"e{i:02d}", u[i], y[i][:, None], plant.dt) for i in range(len(u))]
-    ends = np.cumsum(COUNTS)
-    train, valid, test = tuple(records[: ends[0]]), tuple(records[ends[0] : ends[1]]), tuple(records[ends[1] :])
-    training = TrainingSet(train, valid, N_INIT, plant.channels)
-    return Dataset(f"{rig}_{seed}", training, test, N_INIT, plant.channels)
+    return in_splits(f"{rig}_{seed}", records, COUNTS, N_INIT, plant.channels)
 
 
 @dataclass(eq=False)

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from numpy.random import Generator
 
 from simgap.data.simulated.rigs.plants import Rig
+from simgap.data.simulated.signals import ramps, sines, steps
 
 KINDS = ("steps", "sines", "triangle", "chirp")  # of input, by turns
 
@@ -20,23 +21,15 @@ def draw_input(rig: Rig, kind: str, rng: Generator) -> Float[np.ndarray, " T"]:
 
 
 def _steps(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Draw levels within 1, each held for 5 to 25 samples."""
-    holds = rng.integers(5, 26, samples // 5)
-    return np.repeat(rng.uniform(-1.0, 1.0, len(holds)), holds)[:samples]
+    return steps(samples, 5, 25, rng)
 
 
 def _sines(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Add six sines with periods of 12 to 150 samples; the largest value is 1."""
-    periods = np.geomspace(12, 150, 6) * rng.uniform(0.85, 1.15, 6)
-    waves = np.sin(2 * np.pi * (np.arange(samples)[:, None] / periods + rng.random(6))).sum(axis=1)  # [T]
-    return waves / np.abs(waves).max()
+    return sines(samples, 150, 6, rng)
 
 
 def _triangle(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Draw slow ramps to and fro between turning points of either sign, 25 to 60 samples apart."""
-    turns = np.cumsum(rng.integers(25, 61, samples // 25 + 2)) - 25
-    peaks = rng.uniform(0.4, 1.0, len(turns)) * (-1.0) ** (np.arange(len(turns)) + rng.integers(2))
-    return np.interp(np.arange(samples), turns, peaks)
+    return ramps(samples, 25, 60, rng)
 
 
 def _chirp(samples: int, rng: Generator) -> Float[np.ndarray, " T"]:

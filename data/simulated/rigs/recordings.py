@@ -12,7 +12,8 @@ from simgap.data.simulated.rigs.inputs import KINDS, draw_input
 from simgap.data.simulated.rigs.motion import simulate_motion
 from simgap.data.simulated.rigs.plants import RIGS
 from simgap.data.simulated.rigs.sensors import measure
-from simgap.records import Dataset, Experiment, TrainingSet
+from simgap.data.simulated.signals import in_splits
+from simgap.records import Dataset, Experiment
 
 N_INIT = 20
 SUBSTEPS = 20  # of the integration, per sample
@@ -45,7 +46,4 @@ def hide(
     for number, (u, motion, stream) in enumerate(zip(inputs, motions, streams, strict=True)):
         y = measure(plant, size, motion, noise * spread, colour, stream[3], substeps)
         records.append(Experiment(f"e{number:02d}", u[:, None], y, plant.dt))
-    ends = np.cumsum(counts)
-    train, valid, test = tuple(records[: ends[0]]), tuple(records[ends[0] : ends[1]]), tuple(records[ends[1] :])
-    training = TrainingSet(train, valid, N_INIT, plant.channels)
-    return Dataset(f"{rig}_{seed}", training, test, N_INIT, plant.channels)
+    return in_splits(f"{rig}_{seed}", records, counts, N_INIT, plant.channels)
