@@ -17,7 +17,7 @@ def steps(samples: int, shortest: int, longest: int, rng: Generator) -> Float[np
     return np.repeat(rng.uniform(-1.0, 1.0, len(holds)), holds)[:samples]
 
 
-def sines(samples: int, longest: float, count: int, rng: Generator) -> Float[np.ndarray, " T"]:
+def sines(samples: int, longest: int, count: int, rng: Generator) -> Float[np.ndarray, " T"]:
     """Add so many sines with periods of 12 to `longest` samples; the largest value is 1."""
     periods = np.geomspace(12, longest, count) * rng.uniform(0.85, 1.15, count)
     waves = np.sin(2 * np.pi * (np.arange(samples)[:, None] / periods + rng.random(count))).sum(axis=1)  # [T]
