@@ -99,6 +99,7 @@ def test_the_wheel_holds_every_file_under_one_name(wheels):
     assert "simgap/py.typed" in held
 
 
+@pytest.mark.slow
 def test_it_runs_in_a_clean_environment_beside_a_foreign_package_called_baselines(wheels, tmp_path):
     run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv")
     bin = tmp_path / "venv" / "bin"

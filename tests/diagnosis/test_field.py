@@ -26,7 +26,7 @@ def named(answer):
     ("rig", "effects", "noise", "colour", "seed"),
     [
         ("speed_loop", {"coulomb_friction": 0.5}, 0.02, 0.0, 1),
-        ("axis", {"constant_load": 0.5, "coulomb_friction": 0.5}, 0.02, 0.0, 50),
+        pytest.param("axis", {"constant_load": 0.5, "coulomb_friction": 0.5}, 0.02, 0.0, 50, marks=pytest.mark.slow),
         ("axis", {"dead_zone": 0.25}, 0.01, 0.8, 45),
         ("pendulum", {"gravity": 0.5}, 0.02, 0.0, 115),
     ],

@@ -7,9 +7,16 @@ from pathlib import Path
 import pytest
 
 GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
+# More than five seconds each.
+SLOW = (
+    "slide-hysteresis", "slide-outside-force", "slide-pair", "stage-backlash", "stage-torque", "tank-sqrt",
+    "tanks-overflow",
+)  # fmt: skip
 
 
-@pytest.mark.parametrize("name", GOLDEN["RIGS"])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in GOLDEN["RIGS"]]
+)
 def test_the_answer_about_a_rig_is_what_it_was(name):
     kept = json.loads((GOLDEN["KEPT"] / f"{name}.json").read_text(encoding="utf-8"))
     assert not GOLDEN["differences"](kept, GOLDEN["without_words"](GOLDEN["answer"](name)))

@@ -13,7 +13,7 @@ from simgap.records import Channel, Channels
 # Only who knows what the output is can name these: another kind of plant does the same without them. Of a position with
 # its velocity the readings tell the kinds.
 KNOWN_BY_THE_CARD = ("actuator_lag", "sensor_lag", "constant_load")
-FAST = [("cart", "coulomb_friction"), ("slide", "input_delay")]
+FAST = [("cart", "coulomb_friction")]
 REST = [
     (rig, effect)
     for rig in RIGS

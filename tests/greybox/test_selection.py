@@ -65,8 +65,8 @@ def test_what_the_readings_seemed_to_show_must_pass_against_the_rest_too():
     ("rig", "effects"),
     [
         ("cart", {"coulomb_friction": 1.0, "dead_zone": 1.0}),
-        ("stage", {"absolute_sensor": 1.0, "cubic_stiffness": 1.0}),
-        ("slide", {"quadratic_drag": 1.0, "sensor_drift": 1.0}),
+        pytest.param("stage", {"absolute_sensor": 1.0, "cubic_stiffness": 1.0}, marks=pytest.mark.slow),
+        pytest.param("slide", {"quadratic_drag": 1.0, "sensor_drift": 1.0}, marks=pytest.mark.slow),
     ],
 )
 def test_every_effect_of_the_answer_passes_alone_against_the_rest(rig, effects):

@@ -72,6 +72,7 @@ def test_without_a_cluster_the_run_is_refused(suite, tmp_path, capfd):
         assert line.startswith(f"simgap: --engine ray: there is no cluster at {wrong}: ")
 
 
+@pytest.mark.slow
 def test_the_cases_of_the_recovery_study_run_on_a_cluster_as_on_one_machine(tmp_path):
     from dataclasses import replace
 
