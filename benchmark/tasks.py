@@ -18,7 +18,7 @@ Simulate = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Evaluation:
     """A fitted model before one test experiment; n_init measured outputs may start a simulation.
 
     `simulate(u [B, T, nu], y_init [B, n_init, ny])` returns y_hat [B, T-n_init, ny].
@@ -50,7 +50,7 @@ class Task(ABC):
     name: ClassVar[str]
 
     @abstractmethod
-    def score(self, trial: Trial) -> Outcome:
+    def score(self, evaluation: Evaluation) -> Outcome:
         """Figures per output, in physical units."""
 
 
@@ -60,10 +60,10 @@ class FreeRun(Task):
 
     name: ClassVar[str] = "free_run"
 
-    def score(self, trial: Trial) -> Outcome:
+    def score(self, evaluation: Evaluation) -> Outcome:
         """Score rows n_init .. T-1."""
-        y = trial.experiment.y[trial.n_init :]
-        return Outcome(score_outputs(y, trial.free_run, trial.channels), is_finite(trial.free_run))
+        y = evaluation.experiment.y[evaluation.n_init :]
+        return Outcome(score_outputs(y, evaluation.free_run, evaluation.channels), is_finite(evaluation.free_run))
 
 
 @dataclass(frozen=True)
@@ -72,12 +72,12 @@ class Differences(Task):
 
     name: ClassVar[str] = "differences"
 
-    def score(self, trial: Trial) -> Outcome:
+    def score(self, evaluation: Evaluation) -> Outcome:
         """Score y(k) - y(k-1) for rows n_init .. T-1; the first one starts at the last measured sample."""
-        start = trial.experiment.y[trial.n_init - 1 : trial.n_init]
-        y = np.diff(trial.experiment.y[trial.n_init - 1 :], axis=0)
-        y_hat = np.diff(np.concatenate((start, trial.free_run)), axis=0)
-        return Outcome(score_outputs(y, y_hat, trial.channels), is_finite(y_hat))
+        start = evaluation.experiment.y[evaluation.n_init - 1 : evaluation.n_init]
+        y = np.diff(evaluation.experiment.y[evaluation.n_init - 1 :], axis=0)
+        y_hat = np.diff(np.concatenate((start, evaluation.free_run)), axis=0)
+        return Outcome(score_outputs(y, y_hat, evaluation.channels), is_finite(y_hat))
 
 
 @dataclass(frozen=True)
@@ -97,24 +97,24 @@ class Forecast(Task):
         if self.horizons[:1] != (1,) or list(self.horizons) != sorted(set(self.horizons)):
             raise UnusableInput(f"the horizons {self.horizons} must start at 1 and increase")
 
-    def score(self, trial: Trial) -> Outcome:
+    def score(self, evaluation: Evaluation) -> Outcome:
         """Score all steps 1 .. max(horizons) of all windows together, and each horizon by itself."""
-        experiment, n_init = trial.experiment, trial.n_init
+        experiment, n_init = evaluation.experiment, evaluation.n_init
         length = min(self.horizons[-1], len(experiment) - n_init)
         starts = self.starts(len(experiment) - n_init - length)
         rows = starts[:, None] + np.arange(n_init + length)  # [B, n_init + length]
         u, y = experiment.u[rows], experiment.y[rows]  # [B, n_init + length, nu or ny]
-        y_hat = trial.simulate(u, y[:, :n_init])  # [B, length, ny]
+        y_hat = evaluation.simulate(u, y[:, :n_init])  # [B, length, ny]
         y = y[:, n_init:]
 
         ny = y.shape[2]
-        metrics = score_outputs(y.reshape(-1, ny), y_hat.reshape(-1, ny), trial.channels)
-        for i, channel in enumerate(trial.channels.outputs):
+        metrics = score_outputs(y.reshape(-1, ny), y_hat.reshape(-1, ny), evaluation.channels)
+        for i, channel in enumerate(evaluation.channels.outputs):
             ahead = [h for h in self.horizons if h <= length]
             by_horizon = {str(h): score(y[:, h - 1, i], y_hat[:, h - 1, i])["rmse"] for h in ahead}
-            by_horizon["all"] = score(experiment.y[n_init:, i], trial.free_run[:, i])["rmse"]
+            by_horizon["all"] = score(experiment.y[n_init:, i], evaluation.free_run[:, i])["rmse"]
             metrics[channel.name]["rmse_by_horizon"] = by_horizon
-        return Outcome(metrics, is_finite(y_hat) and is_finite(trial.free_run))
+        return Outcome(metrics, is_finite(y_hat) and is_finite(evaluation.free_run))
 
     def starts(self, last: int) -> Int[np.ndarray, " B"]:
         """First rows of the windows, from 0 to `last`."""

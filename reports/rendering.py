@@ -10,7 +10,8 @@ from simgap.reports.tables import Cell, Table
 if TYPE_CHECKING:
     import rich.console
 
-LEFT = ("model", "status", "claim", "section", "verdict", "evidence", "the paper's figures")  # columns of words
+# Columns of words.
+LEFT = ("model", "status", "claim", "section", "judgement", "verdict", "evidence", "the paper's figures")
 WIDEST_WORD = 18  # of a heading on a terminal, where longer ones are broken
 WIDEST_TEXT = 24  # of a column of words on a narrow terminal; a wide one gives half of what numbers leave
 

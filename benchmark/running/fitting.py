@@ -22,7 +22,7 @@ from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
 from simgap.running.provenance import provenance
 from simgap.running.workers import threads_in_force
-from simgap.tasks import TASKS, USUAL, Task, Trial
+from simgap.tasks import TASKS, USUAL, Evaluation, Task
 
 # Bytes of a model.json.
 LARGEST_DESCRIPTION = 1 << 20
@@ -147,21 +147,21 @@ def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Re
     results = []
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
-        trial = Trial(simulate, experiment, dataset.n_init, dataset.channels)
-        results += [_score(trial, simulate, task, about) for task in tasks]
+        evaluation = Evaluation(simulate, experiment, dataset.n_init, dataset.channels)
+        results += [_score(evaluation, simulate, task, about) for task in tasks]
     units = {channel.name: channel.unit for channel in dataset.channels.outputs}
     return [replace(result, units=units) for result in results]
 
 
-def _score(trial: Trial, simulate: CheckedSimulation, task: Task, about: Result) -> Result:
-    about = replace(about, experiment=trial.experiment.name, task=task.name)
+def _score(evaluation: Evaluation, simulate: CheckedSimulation, task: Task, about: Result) -> Result:
+    about = replace(about, experiment=evaluation.experiment.name, task=task.name)
     before = simulate.seconds
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # an overflow shows in the figures
-            outcome = task.score(trial)
+            outcome = task.score(evaluation)
     except (Exception, SystemExit) as error:  # a model may raise anything
-        metrics = failed_metrics(trial.channels)
+        metrics = failed_metrics(evaluation.channels)
         return replace(about, status="error", message=reason("simulate", error), metrics=metrics)
     return replace(
         about,

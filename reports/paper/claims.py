@@ -12,21 +12,21 @@ from simgap.reports.paper.claim_rules import RULES, Figures, Rule, Undecided
 from simgap.reports.paper.tables import PRINTED, Values, rows_by_label, values_by_seed
 from simgap.reports.tables import Cell, Table
 
-Verdict = Literal["holds", "does not hold", "cannot be told"]
+Judgement = Literal["holds", "does not hold", "cannot be told"]
 
 
 @dataclass(frozen=True)
 class Claim:
     """One claim of the paper: where it stands, what our figures say to it and which figures those are.
 
-    `printed` is the verdict of the same rule on the figures that the paper prints.
+    `printed` is the judgement of the same rule on the figures that the paper prints.
     """
 
     text: str
     section: str
-    verdict: Verdict
+    judgement: Judgement
     evidence: str
-    printed: Verdict
+    printed: Judgement
     rule: str
 
 
@@ -39,9 +39,9 @@ def claims(results: Sequence[Result]) -> list[Claim]:
     printed = Figures(_printed())
     found = []
     for text, section, rule in RULES:
-        verdict, evidence = _decide(rule, medians, single)
+        judgement, evidence = _decide(rule, medians, single)
         on_paper, _ = _decide(rule, printed, [printed])
-        found.append(Claim(text, section, verdict, evidence, on_paper, " ".join((rule.__doc__ or "").split())))
+        found.append(Claim(text, section, judgement, evidence, on_paper, " ".join((rule.__doc__ or "").split())))
     return found
 
 
@@ -50,20 +50,20 @@ def claims_table(found: Sequence[Claim]) -> Table:
     rules = list(dict.fromkeys(claim.rule for claim in found))
     rows = [
         [
-            Cell(f"{claim.text} [{rules.index(claim.rule) + 1}]"), Cell(claim.section), Cell(claim.verdict),
+            Cell(f"{claim.text} [{rules.index(claim.rule) + 1}]"), Cell(claim.section), Cell(claim.judgement),
             Cell(claim.evidence), Cell(claim.printed),
         ]
         for claim in found
     ]  # fmt: skip
     about = (
-        "The claims are those of sections 3.9 and 4, in our words. The last column is the verdict of the same rule on "
-        "the figures that the paper prints, which stand for one seed."
+        "The claims are those of sections 3.9 and 4, in our words. The last column is the judgement of the same rule "
+        "on the figures that the paper prints, which stand for one seed."
     )
-    columns = ["claim", "section", "verdict", "evidence", "the paper's figures"]
+    columns = ["claim", "section", "judgement", "evidence", "the paper's figures"]
     return Table("The paper's claims", columns, rows, [*rules, about])
 
 
-def _decide(rule: Rule, medians: Figures, seeds: Sequence[Figures]) -> tuple[Verdict, str]:
+def _decide(rule: Rule, medians: Figures, seeds: Sequence[Figures]) -> tuple[Judgement, str]:
     try:
         holds, evidence = rule(medians)
     except Undecided as why:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from simgap.records import Channels, Experiment, UnusableInput
-from simgap.tasks import Differences, Forecast, FreeRun, Trial
+from simgap.tasks import Differences, Evaluation, Forecast, FreeRun
 
 CHANNELS = Channels.unnamed(1, 1)
 
@@ -22,12 +22,12 @@ class Hold:
         return np.repeat(y_init[:, -1:], u.shape[1] - y_init.shape[1], axis=1)
 
 
-def trial(length, n_init=3):
-    return Trial(Hold(), ramp(length), n_init, CHANNELS)
+def evaluation(length, n_init=3):
+    return Evaluation(Hold(), ramp(length), n_init, CHANNELS)
 
 
 def test_a_free_run_sees_all_inputs_and_only_the_first_outputs():
-    run = trial(20)
+    run = evaluation(20)
     outcome = FreeRun().score(run)
     ((shape, y_init),) = run.simulate.asked
     assert shape == (1, 20, 1)
@@ -37,14 +37,14 @@ def test_a_free_run_sees_all_inputs_and_only_the_first_outputs():
 
 
 def test_a_forecast_of_a_held_ramp_errs_by_its_horizon():
-    figures = Forecast().score(trial(200)).metrics["y0"]
+    figures = Forecast().score(evaluation(200)).metrics["y0"]
     horizons = figures["rmse_by_horizon"]
     assert {h: e for h, e in horizons.items() if h != "all"} == {str(h): h for h in (1, 2, 5, 10, 20, 50)}
-    assert horizons["all"] == FreeRun().score(trial(200)).metrics["y0"]["rmse"]
+    assert horizons["all"] == FreeRun().score(evaluation(200)).metrics["y0"]["rmse"]
 
 
 def test_forecast_windows_are_at_most_1000_and_reach_from_the_first_to_the_last():
-    run = trial(5000)
+    run = evaluation(5000)
     Forecast().score(run)
     shape, y_init = run.simulate.asked[0]
     assert shape == (1000, 53, 1)
@@ -53,16 +53,16 @@ def test_forecast_windows_are_at_most_1000_and_reach_from_the_first_to_the_last(
 
 
 def test_horizons_longer_than_the_record_are_left_out():
-    horizons = Forecast().score(trial(12)).metrics["y0"]["rmse_by_horizon"]
+    horizons = Forecast().score(evaluation(12)).metrics["y0"]["rmse_by_horizon"]
     assert list(horizons) == ["1", "2", "5", "all"]
 
 
 def test_a_record_with_one_sample_to_score_still_has_a_forecast():
-    assert list(Forecast().score(trial(4)).metrics["y0"]["rmse_by_horizon"]) == ["1", "all"]
+    assert list(Forecast().score(evaluation(4)).metrics["y0"]["rmse_by_horizon"]) == ["1", "all"]
 
 
 def test_both_tasks_share_one_free_run():
-    run = trial(100)
+    run = evaluation(100)
     FreeRun().score(run)
     Forecast().score(run)
     assert len(run.simulate.asked) == 2
@@ -75,7 +75,7 @@ def test_horizons_that_do_not_increase_from_one_are_refused(horizons):
 
 
 def test_differences_start_at_the_last_measured_sample():
-    run = trial(20)
+    run = evaluation(20)
     figures = Differences().score(run).metrics["y0"]
     assert figures["n_scored"] == 17
     assert figures["rmse"] == pytest.approx(1.0)  # held differences are zero, those of the ramp are one

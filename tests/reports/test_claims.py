@@ -30,7 +30,7 @@ def figures():
     return EXAMPLE["figures"]()
 
 
-def verdicts(*figures):
+def judgements(*figures):
     rows = [row for seed, found in enumerate(figures) for row in EXAMPLE["rows"](found, seed)]
     return {claim.text: claim for claim in claims(rows)}
 
@@ -74,55 +74,55 @@ def test_every_claim_is_either_decided_by_a_rule_or_said_to_be_out_of_reach():
 
 
 def test_the_papers_own_figures_bear_out_what_it_claims_but_for_the_validation_losses_of_tcns(figures):
-    for text, claim in verdicts(figures).items():
+    for text, claim in judgements(figures).items():
         expected = "cannot be told" if text in UNDECIDED else "does not hold" if text == NOT_EVEN_THERE else "holds"
-        assert claim.verdict == expected, claim
+        assert claim.judgement == expected, claim
         assert claim.printed == ("cannot be told" if text in NOT_PRINTED else expected)
 
 
 @pytest.mark.parametrize("text", FLIPS)
 def test_a_claim_flips_when_the_figures_flip(text, figures):
-    before = verdicts(figures)[text].verdict
+    before = judgements(figures)[text].judgement
     FLIPS[text](figures)
-    after = verdicts(figures)[text].verdict
+    after = judgements(figures)[text].judgement
     assert {before, after} == {"holds", "does not hold"}
 
 
 @pytest.mark.parametrize("text", FLIPS)
 def test_no_claim_is_decided_without_results(text):
-    claim = verdicts()[text]
-    assert claim.verdict == "cannot be told"
+    claim = judgements()[text]
+    assert claim.judgement == "cannot be told"
     assert claim.evidence.startswith("there is no figure ")
 
 
 def test_two_seeds_of_three_decide(figures):
     text, changed = "the decoder is particularly good on phi of the contiguous set", EXAMPLE["figures"]()
     FLIPS[text](changed)
-    claim = verdicts(figures, changed, figures)[text]
-    assert (claim.verdict, claim.evidence) == ("holds", "rank 1 of 10; 2 of 3 seeds agree")
-    assert verdicts(changed, changed, figures)[text].verdict == "does not hold"
+    claim = judgements(figures, changed, figures)[text]
+    assert (claim.judgement, claim.evidence) == ("holds", "rank 1 of 10; 2 of 3 seeds agree")
+    assert judgements(changed, changed, figures)[text].judgement == "does not hold"
 
 
 def test_seeds_that_disagree_decide_nothing(figures):
     text, changed = "the decoder is particularly good on phi of the contiguous set", EXAMPLE["figures"]()
     FLIPS[text](changed)
-    assert verdicts(figures, changed)[text].verdict == "cannot be told"
+    assert judgements(figures, changed)[text].judgement == "cannot be told"
 
 
 def test_seeds_that_lack_a_model_have_no_vote(figures):
     text = "the decoder is particularly good on phi of the contiguous set"
-    claim = verdicts(figures, {"Decoder": figures["Decoder"]})[text]
-    assert (claim.verdict, claim.evidence) == ("holds", "rank 1 of 10")
+    claim = judgements(figures, {"Decoder": figures["Decoder"]})[text]
+    assert (claim.judgement, claim.evidence) == ("holds", "rank 1 of 10")
 
 
 def test_a_diverged_network_is_the_last_of_its_column_and_breaks_nothing(figures):
     figures["Decoder"][PHI] = figures["Decoder delta"][PHI] = float("inf")
-    found = verdicts(figures)
-    assert found["the decoder is particularly good on phi of the contiguous set"].verdict == "does not hold"
-    assert found["model 6 predicts best on average on both sets"].verdict == "holds"
+    found = judgements(figures)
+    assert found["the decoder is particularly good on phi of the contiguous set"].judgement == "does not hold"
+    assert found["model 6 predicts best on average on both sets"].judgement == "holds"
 
 
-def test_the_checklist_shows_verdict_evidence_and_rule(figures):
+def test_the_checklist_shows_judgement_evidence_and_rule(figures):
     table = claims_table(claims(EXAMPLE["rows"](figures)))
     assert len(table.rows) == len(RULES)
     text = to_markdown(table)

@@ -41,4 +41,4 @@ def coloured_noise(samples: int, colour: float, rng: Generator) -> Float[np.ndar
     """Draw AR(1) noise of standard deviation 1."""
     draws = rng.standard_normal(samples)
     draws[1:] *= np.sqrt(1 - colour**2)
-    return lfilter([1.0], [1.0, -colour], draws)
+    return np.asarray(lfilter([1.0], [1.0, -colour], draws))

@@ -19,7 +19,8 @@ def suitable(rig: str, outside: bool = False) -> tuple[str, ...]:
 
 def largest_angle(strength: float) -> float:
     """Return how far a pendulum swings, rad."""
-    return float(np.interp(strength, *zip(*ANGLES, strict=True)))
+    strengths, angles = zip(*ANGLES, strict=True)
+    return float(np.interp(strength, strengths, angles))
 
 
 def apply(
