@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import signal
 import sys
 import tempfile
@@ -11,7 +10,8 @@ import types
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
-from multiprocessing.context import BaseContext
+from multiprocessing.context import BaseContext, ForkServerContext, SpawnContext
+from multiprocessing.synchronize import RLock
 from typing import Any
 
 from pebble import CONSTS, ProcessExpired, ProcessPool
@@ -55,8 +55,9 @@ class Local:
         with _main_left_alone(), contextlib.ExitStack() as stack:
             notes = stack.enter_context(tempfile.TemporaryDirectory(prefix="simgap", ignore_cleanup_errors=True))
             limits = replace(self.limits, environment=self.limits.environment | {"SIMGAP_RUN": notes})
+            context = _context(todo)  # lives until its processes have ended
             pool = ProcessPool(min(self.workers, len(todo)), max_tasks=1, initializer=prepare_worker,
-                               initargs=(limits,), context=_context(todo))  # fmt: skip
+                               initargs=(limits,), context=context)  # fmt: skip
             stack.callback(pool.join)
             stack.callback(pool.stop)  # runs before join, and after Ctrl-C too
             pending: dict[Future, Work] = {
@@ -81,10 +82,34 @@ def _execute(work: Work) -> list[Any]:
 def _context(todo: Sequence[Work]) -> BaseContext:
     """Forked from a process that has imported what the work needs, but has done nothing yet; else started anew."""
     if sys.platform != "linux":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
+        return _Spawn()
+    context = _ForkServer()
     context.set_forkserver_preload(list(dict.fromkeys([*PRELOADED, *(name for work in todo for name in work.preload)])))
     return context
+
+
+class _KeptLocks(BaseContext):
+    """Keeps the locks that it makes for as long as it lives.
+
+    A process opens them by name while it starts. The pool drops its own, and with them the names, before it stops the
+    processes that it has just started for work that never came: these would print a FileNotFoundError.
+    """
+
+    def __init__(self) -> None:
+        self._locks: list[RLock] = []
+
+    def RLock(self) -> RLock:
+        """A lock that is kept."""
+        self._locks.append(super().RLock())
+        return self._locks[-1]
+
+
+class _ForkServer(_KeptLocks, ForkServerContext):
+    """Processes forked from one that has done nothing yet."""
+
+
+class _Spawn(_KeptLocks, SpawnContext):
+    """Processes started anew."""
 
 
 def _rows_of(future: Future, work: Work, limits: Limits) -> list[Any]:
