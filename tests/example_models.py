@@ -113,6 +113,16 @@ class Threads(Mean):
         self.fitted = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")}
 
 
+class Libraries(Mean):
+    def fit(self, data, seed):
+        import torch
+        from threadpoolctl import threadpool_info
+
+        super().fit(data, seed)
+        blas = {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+        self.fitted = {"torch": torch.get_num_threads(), "numba": numba.get_num_threads(), "blas": sorted(blas)}
+
+
 class HangsInSimulate(Mean):
     def simulate(self, u, y_init):
         signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -24,8 +24,8 @@ from simgap.running.workers import Limits, prepare_worker, threads_per_worker
 # Imported once, by the process from which those of the jobs are forked. The models themselves are not: they may have
 # changed since, and a job imports them in milliseconds.
 PRELOADED = (
-    "simgap.running.jobs",
     "simgap.running.engines.preloading",
+    "simgap.running.jobs",
     "scipy.signal",
     "scipy.optimize",
     "scipy.stats",
