@@ -15,14 +15,16 @@ if TYPE_CHECKING:
     from simgap.reports.leaderboard import report
     from simgap.results.regression import Regression, check
     from simgap.running.execution import Progress
-    from simgap.running.fitting import Fit, fit, load_model
+    from simgap.running.fitting import Fit, fit
     from simgap.running.runner import run
     from simgap.running.suites import Suite, load_suite
+    from simgap.saved.archive import load_model, save_model
+    from simgap.saved.simulate import Simulation, simulate
 
 _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
     "simgap.diagnosis.diagnose": ("diagnose",),
-    "simgap.running.fitting": ("Fit", "fit", "load_model"),
+    "simgap.running.fitting": ("Fit", "fit"),
     "simgap.protocol": ("Model",),
     "simgap.records": (
         "Channel", "Channels", "Dataset", "Experiment", "Result", "TrainingSet", "UnusableInput",
@@ -33,13 +35,15 @@ _HOME = {
     "simgap.running.execution": ("Progress",),
     "simgap.running.runner": ("run",),
     "simgap.running.suites": ("Suite", "load_suite"),
+    "simgap.saved.archive": ("load_model", "save_model"),
+    "simgap.saved.simulate": ("Simulation", "simulate"),
 }  # fmt: skip
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
-    "Progress", "Regression", "Result", "Suite", "TrainingSet", "UnusableInput", "check", "describe", "diagnose",
-    "fetch", "fit", "load", "load_model", "load_suite", "report", "run", "save",
+    "Progress", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "check", "describe",
+    "diagnose", "fetch", "fit", "load", "load_model", "load_suite", "report", "run", "save", "save_model", "simulate",
 ]  # fmt: skip
 
 

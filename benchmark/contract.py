@@ -6,8 +6,6 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,8 +13,10 @@ from scipy.signal import lfilter
 
 from simgap.protocol import Model
 from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.registry import MODELS
 from simgap.results.store import plain
-from simgap.running.fitting import CheckedSimulation, ModelFault, check_params, load_model, model_class, reason
+from simgap.running.fitting import CheckedSimulation, ModelFault, check_params, model_class, reason
+from simgap.saved.codec import Encoder, decode_model
 
 N_INIT = 10
 # Share of the mean square error of `hold` that a model of a linear toy plant may have.
@@ -161,12 +161,11 @@ def it_starts_from_a_single_sample_and_from_many(candidate: Candidate) -> None:
 
 
 def saved_and_loaded_it_simulates_the_same(candidate: Candidate) -> None:
-    fitted: Any = candidate.fitted
-    if not hasattr(fitted, "save"):
-        return
-    with TemporaryDirectory() as folder:
-        fitted.save(Path(folder))
-        loaded = load_model(folder)
+    if candidate.name not in MODELS:
+        return  # a file names the model that reads it
+    encoder = Encoder()
+    text = json.dumps(encoder.model(candidate.fitted), allow_nan=False)
+    loaded = decode_model(json.loads(text), encoder.arrays)
     experiment = toy_experiment(9)
     _alike(candidate.one(experiment, loaded), candidate.one(experiment), 0.0, "what was saved simulates differently")
 

@@ -20,6 +20,7 @@ class Model(Protocol):
     what the fit chose (an order, say) that goes into the results; `summary()`, a text for people; `stochastic`, True
     where another seed gives other numbers, as with a network trained from random weights (default False). It goes
     into the results, and `simgap check` then grants the spread of the seeds instead of a rounding error.
+    A fitted model is saved attribute by attribute; `simgap.saved` says what it may declare for that.
     """
 
     def fit(self, data: TrainingSet, seed: int) -> None:

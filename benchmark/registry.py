@@ -63,6 +63,9 @@ class Registry:
         for name, registered in self._targets.items():
             if registered is target:
                 return name
+        for name, point in self._plugins().items():
+            if point.value == ":".join(origin(target)):
+                return name
         raise UnusableInput(f"{target!r} is no registered {self.kind}")
 
     def names(self) -> list[str]:

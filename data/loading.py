@@ -9,13 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from simgap.data.formats.folder import load_folder
-from simgap.data.formats.one_record import Choices, dataset_of
+from simgap.data.formats.headings import find, listed
+from simgap.data.formats.one_record import Choices, dataset_of, record_of
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
-from simgap.records import Dataset, UnusableInput
+from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
 Kinds = str | Mapping[str, str] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """Experiments for a model that is fitted already: of a data set those to test on, and beside them the others."""
+
+    experiments: tuple[Experiment, ...]
+    others: tuple[Experiment, ...]
+    channels: Channels
 
 
 @dataclass(frozen=True)
@@ -66,15 +76,29 @@ def read(
     known = _known(source, choices)
     if known is not None:
         return Reading(with_kinds(known, kind))
-    if not isinstance(source, str | os.PathLike):
-        from simgap.data.formats.frames import table_of  # pandas is slow to import
-
-        table, name = table_of(source), name or "DataFrame"
-    else:
-        table, name = _table(Path(source), choices), name or Path(source).stem
+    table = _table(source, choices)
+    name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
     dataset, said = dataset_of(table, choices, name)
     dataset = with_kinds(dataset, kind)
     return Reading(dataset, (*told(dataset.channels), *said))
+
+
+def read_recordings(source: Any, channels: Channels, dt: float | None = None) -> Recordings:
+    """Read what a model that was fitted on such channels can simulate; `source` and dt are those of `load`.
+
+    A file is one experiment, unsplit, of the columns that the channels name. Raises UnusableInput.
+    """
+    choices = Choices([c.name for c in channels.inputs], [c.name for c in channels.outputs], dt)
+    known = source if isinstance(source, Dataset) else _known(source, Choices(dt=dt))
+    if known is not None:
+        return Recordings(known.test, known.training.valid + known.training.train, known.channels)
+    table = _table(source, choices)
+    for column in (*choices.inputs, *choices.outputs):
+        if not find(table.names, column):
+            raise UnusableInput(f"{table.source} has no column {column!r}, which the model was fitted on; "
+                                f"there are {listed(table.names)}")  # fmt: skip
+    record = record_of(table, choices)
+    return Recordings(record.pieces, (), record.channels)
 
 
 def _known(source: Any, choices: Choices) -> Dataset | None:
@@ -95,8 +119,13 @@ def _known(source: Any, choices: Choices) -> Dataset | None:
     return None
 
 
-def _table(path: Path, choices: Choices) -> Table:
-    """Read a file by its ending; any other ending is CSV."""
+def _table(source: Any, choices: Choices) -> Table:
+    """Read a DataFrame, or a file by its ending; any other ending is CSV."""
+    if not isinstance(source, str | os.PathLike):
+        from simgap.data.formats.frames import table_of  # pandas is slow to import
+
+        return table_of(source)
+    path = Path(source)
     if not path.is_file():  # a pipe would never end
         raise UnusableInput(f"{path} is missing or no ordinary file; give a CSV file")
     match path.suffix.lower():

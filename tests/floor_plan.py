@@ -24,12 +24,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "error_views": {"records", "metrics", "findings", "wording"},
     "baselines": GROUND | {"data", "greybox"},
     "neural": GROUND | {"data"},
-    "contract": GROUND | RUN | {"data"},
+    "saved": GROUND | RUN | {"data"},
+    "contract": GROUND | RUN | {"data", "saved"},
     "reports": {"records", "metrics", "results", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "data", "greybox", "error_views", "reports"},
-    "simgap": GROUND | RUN | {"data", "diagnosis", "reports"},
-    "cli": GROUND | RUN | {"contract", "findings", "data", "greybox", "diagnosis", "reports", "simgap"},
+    "simgap": GROUND | RUN | {"data", "diagnosis", "reports", "saved"},
+    "cli": GROUND | RUN | {"contract", "findings", "data", "greybox", "diagnosis", "reports", "saved", "simgap"},
 }
 
 

@@ -48,8 +48,9 @@ def write_record(path: Path, output: str, seed: int, samples: int = 300) -> None
 
 @pytest.fixture
 def folder(tmp_path):
-    """The reader's folder: a CSV file, a folder of experiments, and every file that the README shows."""
+    """The reader's folder: two CSV files, a folder of experiments, and every file that the README shows."""
     write_record(tmp_path / "my.csv", "y", 0, 600)
+    write_record(tmp_path / "new.csv", "y", 1)
     for seed, split in enumerate(("train", "train", "valid", "test")):
         write_record(tmp_path / "my_data" / split / f"{seed}.csv", "phi", seed)
     for name, text in FILES.items():

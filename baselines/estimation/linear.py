@@ -5,18 +5,18 @@ from __future__ import annotations
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import TooFewSamples
-from simgap.baselines.estimation.fitted import LinearFit
+from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
-from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.records import Channels, Experiment, TrainingSet, UnusableInput
 
 if TYPE_CHECKING:
     import control
@@ -36,6 +36,8 @@ class LinearModel(ABC):
     A final class names its fields and says how one order is estimated. After `fit`, `result` holds the coefficients
     with their standard errors, and `polynomial` what simulates.
     """
+
+    parts: ClassVar = (LinearFit, Orders, Polynomial, Row)  # records in a saved model
 
     result: LinearFit
     select: Criterion
@@ -93,12 +95,19 @@ class LinearModel(ABC):
         return self.polynomial.to_control()
 
     def summary(self) -> str:
-        """Describe the coefficients with standard errors, the poles, and the residual analysis."""
+        """Describe the coefficients with standard errors, the poles, and the residual analysis.
+
+        A model that was loaded has no data left: its outputs are y0, y1, .. then, and there are no residuals.
+        """
         poles = ", ".join(f"{pole:.4g}" for pole in sorted(self.polynomial.poles, key=abs, reverse=True)[:8])
-        outputs = [channel.name for channel in self._data.channels.outputs]
-        inputs = [channel.name for channel in self._data.channels.inputs]
-        correlations = residual_analysis(self.result, self._data.train + self._data.valid, inputs)
-        lines = [f"{name}: {one.text()}" for name, row in zip(outputs, correlations, strict=True) for one in row]
+        data: TrainingSet | None = getattr(self, "_data", None)
+        channels = data.channels if data else Channels.unnamed(*self.polynomial.b.shape[:0:-1])
+        outputs = [channel.name for channel in channels.outputs]
+        lines = []
+        if data:
+            inputs = [channel.name for channel in channels.inputs]
+            correlations = residual_analysis(self.result, data.train + data.valid, inputs)
+            lines = [f"{name}: {one.text()}" for name, row in zip(outputs, correlations, strict=True) for one in row]
         return "\n".join((self.result.table(outputs), f"poles of the simulation: {poles}", *lines))
 
     def _selected(self, data: TrainingSet, candidates: list[Orders]) -> tuple[Orders, LinearFit]:

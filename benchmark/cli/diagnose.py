@@ -32,15 +32,19 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write the model that the answer ends with into this file.")] = None,
 ) -> None:
     """Show what a linear model of the data gets wrong, name the physical cause and measure what it gains."""
     from simgap.diagnosis.diagnose import diagnose
+    from simgap.saved.archive import save_model
 
-    check_writable(json, html)
+    check_writable(json, html, save)
     dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
     answer = diagnose(dataset, seed=seed, profiles=html is not None)
     if json is not None:
         write_json(json, answer.to_json())
     if html is not None:
         html.write_text(answer.to_html(), encoding="utf-8")
+    if save is not None:
+        save_model(answer.model, save, dataset)
     typer.echo(str(answer))

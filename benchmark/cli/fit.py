@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,6 +17,7 @@ from simgap.cli.options import (
     Resample,
     SamplingTime,
     SplitGaps,
+    check_writable,
     parse_params,
     read_data,
     write_json,
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     import rich.console
     import rich.table
 
-    from simgap.records import Result
     from simgap.running.fitting import Fit
 
 # Longer lists, such as a loss per epoch, are for machines.
@@ -44,7 +44,7 @@ def fit(
     split_gaps: SplitGaps = False,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
-    save: Annotated[Path | None, typer.Option(help="Folder for the weights of a network.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write the fitted model into this file.")] = None,
     json: Json = None,
 ) -> None:
     """Fit one model and print what it chose and how well it simulates the test experiments."""
@@ -53,10 +53,13 @@ def fit(
     from simgap.records import UnusableInput
     from simgap.results import store
     from simgap.running import fitting
+    from simgap.saved.archive import save_model
+    from simgap.saved.codec import name_of
 
     params = parse_params(param or ())
-    if save is not None and not hasattr(fitting.model_class(model), "save"):
-        raise UnusableInput(f"--save: {model} is no network, and only networks have weights to save")
+    check_writable(json, save)
+    if save is not None:
+        name_of(fitting.model_class(model))  # refuses what no file could name
     console = Console()
     try:
         fitting.check_params(model, params)  # first, because data may take seconds to load
@@ -70,10 +73,12 @@ def fit(
         raise typer.Exit(1) from None
     if json is not None:
         write_json(json, store.encoded(done.results))
-    if save is not None:
-        done.model.save(save)
     _print_model(console, done)
-    console.print(_scores(done.results))
+    free_runs = [result for result in done.results if result.task == "free_run"]
+    console.print(score_table((result.experiment, result.metrics, result.units) for result in free_runs))
+    if save is not None:
+        save_model(done.model, save, dataset)
+        typer.echo(f"Saved: {save}")
     if any(result.status == "error" for result in done.results):
         raise typer.Exit(1)
 
@@ -121,8 +126,8 @@ def _print_model(console: rich.console.Console, done: Fit) -> None:
         console.print(line, markup=False, highlight=False)
 
 
-def _scores(results: Sequence[Result]) -> rich.table.Table:
-    """The free-run scores per test experiment and output."""
+def score_table(free_runs: Iterable[tuple[str, dict[str, dict[str, Any]], dict[str, str]]]) -> rich.table.Table:
+    """The scores of free runs per experiment and output, from the experiment's name, its figures and the units."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -132,12 +137,10 @@ def _scores(results: Sequence[Result]) -> rich.table.Table:
     table = Table("experiment", "output", title="Free-run simulation", title_justify="left", box=box.SIMPLE_HEAD)
     for heading in ("RMSE", "fit %", "samples"):
         table.add_column(heading, justify="right")
-    for result in results:
-        if result.task != "free_run":
-            continue
-        for output, figures in result.metrics.items():
+    for experiment, metrics, units in free_runs:
+        for output, figures in metrics.items():
             texts = (
-                result.experiment, output, f"{figures['rmse']:.4g} {result.units.get(output, '')}".strip(),
+                experiment, output, f"{figures['rmse']:.4g} {units.get(output, '')}".strip(),
                 f"{figures['fit_percent']:.1f}", str(figures["n_scored"]),
             )  # fmt: skip
             table.add_row(*(Text(printable(text)) for text in texts))

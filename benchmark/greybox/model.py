@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, Problem, initial_states
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
-from simgap.greybox.plant import Plant
+from simgap.greybox.plant import Plant, PlantScales, Term
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
 from simgap.records import LARGEST_VALUE, Experiment
@@ -40,6 +41,21 @@ class FittedPlant:
             records = without_outliers(records, first.errors, baseline.outliers)
         estimate = Problem(start.plant, records, baseline.noise).fit(start.theta, first.local)
         return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers)
+
+    def saved_state(self) -> dict[str, Any]:
+        """What simulates; the training data and their errors stay behind."""
+        return {"plant": self.estimate.plant, "theta": self.estimate.theta, "noise": self.noise,
+                "outputs": self.outputs, "outliers": self.outliers}  # fmt: skip
+
+    @classmethod
+    def from_saved(cls, state: dict[str, Any]) -> FittedPlant:
+        """Build a plant without training data. Raises ValueError for parameters that are not those of the plant."""
+        plant, theta, noise = state["plant"], np.asarray(state["theta"], dtype=np.float64), state["noise"]
+        if theta.shape != (len(plant.free),) or len(noise.deviations) != plant.ny or len(state["outputs"]) != plant.ny:
+            raise ValueError("the parameters are not those of such a plant")
+        nothing = Records.measured(np.empty((0, 0, plant.nu)), np.empty((0, 0, plant.ny)), plant.dt)
+        estimate = Estimate(plant, theta, np.empty((0, 0)), nothing.y, np.nan, True)
+        return cls(estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]))
 
     @property
     def forecasting(self) -> Plant:
@@ -100,6 +116,9 @@ class FittedPlant:
 @dataclass(eq=False)
 class GreyBoxModel:
     """A model of a data set: one fitted plant for each of its outputs, or for a position with its velocity."""
+
+    parts: ClassVar = (FittedPlant, Noise, Outliers, Plant, PlantScales, SignalScales, Term)  # records in a saved model
+    saved_as: ClassVar = "greybox"
 
     plants: list[FittedPlant] = field(default_factory=list, repr=False)
 

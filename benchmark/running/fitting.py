@@ -24,8 +24,6 @@ from simgap.running.provenance import provenance
 from simgap.running.workers import threads_in_force
 from simgap.tasks import TASKS, USUAL, Evaluation, Task
 
-# Bytes of a model.json.
-LARGEST_DESCRIPTION = 1 << 20
 # Characters of what a fit says that it chose, and of a message, in a line of results.
 LARGEST_FITTED = 1 << 20
 LONGEST_MESSAGE = 1000
@@ -68,25 +66,6 @@ def fit(
     )  # fmt: skip
     about = fit_model(built, dataset.training, about)
     return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
-
-
-def load_model(folder: str | Path) -> Any:
-    """Load the network that its `save` or `simgap fit --save` wrote into a folder. Nothing in the files is executed.
-
-    Raises UnusableInput.
-    """
-    file = Path(folder) / "model.json"
-    try:
-        if file.stat().st_size > LARGEST_DESCRIPTION:
-            raise UnusableInput(f"{file} is larger than any description of a model")
-        about = json.loads(file.read_text(encoding="utf-8"))
-        kind = MODELS[str(about["model"])]
-        load = kind.load
-    except UnusableInput:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise UnusableInput(f"{folder} holds no network of simgap: {' '.join(str(error).split())[:200]}") from error
-    return load(Path(folder), about)
 
 
 def model_class(reference: str) -> type:

@@ -13,7 +13,7 @@ from simgap.data.formats.sampling import check_clock, sampling_time
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import kind_of
 from simgap.data.splits import assemble, split_in_time, split_pieces
-from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, UnusableInput
+from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, Experiment, UnusableInput
 
 SEPARATED = {",": "", ";": "semicolons between cells", "\t": "tabs between cells"}
 
@@ -30,8 +30,24 @@ class Choices:
     split_gaps: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class OneRecord:
+    """What a table holds: the record, or its pieces between gaps, its channels, and in words what was inferred."""
+
+    pieces: tuple[Experiment, ...]
+    channels: Channels
+    said: tuple[str, ...]
+
+
 def dataset_of(table: Table, choices: Choices, name: str) -> tuple[Dataset, tuple[str, ...]]:
     """Make a data set of one record, and say in words what was inferred beside the kinds. Raises UnusableInput."""
+    record = record_of(table, choices)
+    splits = split_in_time(record.pieces[0]) if len(record.pieces) == 1 else split_pieces(record.pieces)
+    return assemble(name, splits, record.channels, None, table.source), record.said
+
+
+def record_of(table: Table, choices: Choices) -> OneRecord:
+    """Read the chosen columns of a table, and its sampling time. Raises UnusableInput."""
     _check(table, choices)
     check_columns((*choices.inputs, *choices.outputs), table.source)
     # A misspelt column is a better answer than a missing sampling time.
@@ -47,9 +63,7 @@ def dataset_of(table: Table, choices: Choices, name: str) -> tuple[Dataset, tupl
     else:
         step = _sampling_time(table, clock, choices)
         pieces, said = (table.experiment("record", inputs, outputs, step),), ()
-    splits = split_in_time(pieces[0]) if len(pieces) == 1 else split_pieces(pieces)
-    dataset = assemble(name, splits, channels, None, table.source)
-    return dataset, _told(table, clock, channels, pieces[0].dt, choices, said)
+    return OneRecord(tuple(pieces), channels, _told(table, clock, channels, pieces[0].dt, choices, said))
 
 
 def _check(table: Table, choices: Choices) -> None:

@@ -44,6 +44,7 @@ class Network(ABC):
     """
 
     stochastic: ClassVar[bool] = True
+    parts: ClassVar = (Scaling,)  # records in a saved model
 
     mode: Literal["windowed", "stateful"] = "stateful"
     window: int = 40
@@ -154,14 +155,14 @@ class Network(ABC):
         """Number of weights."""
         return sum(p.numel() for p in self.trained.parameters())
 
-    def save(self, folder: str | Path) -> None:
-        """Write weights.safetensors and model.json; `simgap.load_model` reads them."""
-        weights.save(self, Path(folder))
+    def saved_state(self) -> dict[str, Any]:
+        """What a saved model holds of it."""
+        return weights.state_of(self)
 
     @classmethod
-    def load(cls, folder: Path, about: dict[str, Any]) -> Any:
-        """Read the model that `save` wrote, of which `about` is what model.json holds. Raises UnusableInput."""
-        return weights.load(cls, folder, about)
+    def from_saved(cls, state: dict[str, Any]) -> Any:
+        """Build the network that `saved_state` describes. Raises UnusableInput, ValueError, TypeError, RuntimeError."""
+        return weights.build(cls, state)
 
     def hyper_parameters(self) -> dict[str, Any]:
         """Give the fields that a user may choose."""

@@ -145,13 +145,14 @@ def test_a_network_is_fitted_saved_and_loaded_again(capsys, folder, tmp_path):
     )
     assert (code, err) == (0, "")
     assert "epochs = 1" in out
+    assert f"Saved: {tmp_path / 'w'}" in out
     assert simgap.load_model(tmp_path / "w").n_params > 3000
 
 
-def test_weights_of_what_has_none_are_refused_before_the_fit(capsys, folder, tmp_path):
-    code, out, err = run(capsys, "fit", "mean", folder, "--save", tmp_path / "w")
+def test_a_model_that_is_not_registered_is_not_saved_and_says_so_before_the_fit(capsys, folder, tmp_path, example):
+    code, out, err = run(capsys, "fit", example("Mean"), folder, "--save", tmp_path / "w")
     assert (code, out) == (2, "")
-    assert "only networks have weights" in err
+    assert "is not registered, and a file names the model that reads it" in err
     assert not (tmp_path / "w").exists()
 
 

@@ -106,22 +106,21 @@ def suite_seeds(folder: Path) -> list[bytes]:
     ]
 
 
-def saved(folder: Path) -> Path:
-    """A trained network on disk."""
-    if not (folder / "net").exists():
-        model = simgap.fit("gru", small_dataset(), {"units": 2, "epochs": 1, "batches": 1}).model
-        model.save(folder / "net")
-    return folder / "net"
+def saved(folder: Path, model: str, **params: int) -> bytes:
+    """A fitted model as a file holds it."""
+    data = small_dataset()
+    simgap.save_model(simgap.fit(model, data, params).model, folder / "model", data)
+    return (folder / "model").read_bytes()
 
 
-def feed_weights(data: bytes, folder: Path) -> None:
-    (saved(folder) / "weights.safetensors").write_bytes(data)
-    simgap.load_model(folder / "net")
+def saved_seeds(folder: Path) -> list[bytes]:
+    network = saved(folder, "gru", units=2, epochs=1, batches=1)
+    return [network, saved(folder, "arx", na=1, nb=1), saved(folder, "greybox")]
 
 
-def feed_model(data: bytes, folder: Path) -> None:
-    (saved(folder) / "model.json").write_bytes(data)
-    simgap.load_model(folder / "net")
+def feed_saved(data: bytes, folder: Path) -> None:
+    (folder / "model").write_bytes(data)
+    simgap.load_model(folder / "model")
 
 
 def feed_outcomes(data: bytes, folder: Path) -> None:
@@ -138,8 +137,7 @@ TARGETS = {
     "card": Target(feed_card, card_seeds),
     "results": Target(feed_results, result_seeds),
     "suite": Target(feed_suite, suite_seeds),
-    "weights": Target(feed_weights, lambda folder: [(saved(folder) / "weights.safetensors").read_bytes()]),
-    "model": Target(feed_model, lambda folder: [(saved(folder) / "model.json").read_bytes()]),
+    "saved": Target(feed_saved, saved_seeds),
     "outcomes": Target(feed_outcomes, lambda folder: [b"{}\n", b'{"case": {}, "answer": []}\n']),
     "params": Target(feed_params, lambda folder: [b"na=3", b"x=[1, {a = 2}]", b"d=1979-05-27", b'e="\\u0041"']),
 }
