@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import safetensors.numpy
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 
 from simgap.protocol import Model
 from simgap.records import Channel, Channels, Dataset, UnusableInput
@@ -18,11 +18,6 @@ from simgap.saved.codec import Encoder, build, decode_model
 
 VERSION = 1
 KEY = "simgap"
-# What reading a broken file, or building a model of what is none, may raise.
-UNREADABLE = (
-    OSError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, ArithmeticError, MemoryError,
-    SafetensorError,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -69,7 +64,7 @@ def save_model(model: Any, file: str | Path, dataset: Dataset) -> None:
     encoded = encoder.model(model)
     try:
         decode_model(encoded, encoder.arrays)
-    except UNREADABLE as error:
+    except Exception as error:  # as below
         raise UnusableInput(f"the model cannot be saved: {_one_line(error)}") from error
     fitted_on = asdict(FittedOn.of(dataset))
     about = {"version": VERSION, "simgap": version("simgap"), **encoded, "fitted_on": fitted_on}
@@ -107,10 +102,10 @@ def read_saved(file: str | Path) -> SavedModel:
         return SavedModel(about["model"], decode_model(about, arrays), FittedOn.read(about["fitted_on"]))
     except UnusableInput:
         raise
-    except UNREADABLE as error:
+    except Exception as error:  # a model that is built of what is none may raise anything
         raise UnusableInput(f"{file} is no saved model: {_one_line(error)}") from error
 
 
 def _one_line(error: BaseException) -> str:
     text = " ".join(str(error).split())[:200]
-    return f"{type(error).__name__} {text}" if isinstance(error, KeyError) else text
+    return text if text and not isinstance(error, KeyError) else f"{type(error).__name__} {text}".rstrip()
