@@ -45,6 +45,7 @@ def diagnose(
         write_json(json, answer.to_json())
     if html is not None:
         html.write_text(answer.to_html(), encoding="utf-8")
+    typer.echo(str(answer))
     if save is not None:
         save_model(answer.model, save, dataset)
-    typer.echo(str(answer))
+        typer.echo(f"Saved: {save}")
