@@ -101,7 +101,8 @@ class LinearModel(ABC):
         """
         poles = ", ".join(f"{pole:.4g}" for pole in sorted(self.polynomial.poles, key=abs, reverse=True)[:8])
         data: TrainingSet | None = getattr(self, "_data", None)
-        channels = data.channels if data else Channels.unnamed(*self.polynomial.b.shape[:0:-1])
+        ny, nu = self.polynomial.b.shape[1:]
+        channels = data.channels if data else Channels.unnamed(nu, ny)
         outputs = [channel.name for channel in channels.outputs]
         lines = []
         if data:

@@ -14,7 +14,7 @@ from safetensors import safe_open
 from simgap.protocol import Model
 from simgap.records import Channel, Channels, Dataset, UnusableInput
 from simgap.registry import MODELS
-from simgap.saved.codec import Encoder, build, decode_model
+from simgap.saved.codec import Encoder, build_record, decode_model
 
 VERSION = 1
 KEY = "simgap"
@@ -39,7 +39,7 @@ class FittedOn:
     def read(cls, text: dict[str, Any]) -> FittedOn:
         """Read what `asdict` made of one."""
         columns = text["channels"]
-        inputs, outputs = (tuple(build(Channel, one) for one in columns[part]) for part in ("inputs", "outputs"))
+        inputs, outputs = (tuple(build_record(Channel, one) for one in columns[part]) for part in ("inputs", "outputs"))
         dt, n_init = float(text["dt"]), int(text["n_init"])
         if not (inputs and outputs and dt > 0 and n_init > 0):
             raise ValueError("it does not say what it was fitted on")

@@ -79,7 +79,7 @@ def decode_model(text: Any, arrays: dict[str, np.ndarray]) -> Any:
     kind = MODELS[str(text["model"])]
     parts = {part.__name__: part for part in getattr(kind, "parts", ())}
     state = {name: _decoded(value, arrays, parts) for name, value in text["state"].items()}
-    check(kind, state)
+    check_types(kind, state)
     if hasattr(kind, "from_saved"):
         return kind.from_saved(state)
     model = kind.__new__(kind)
@@ -114,19 +114,19 @@ def _decoded(text: Any, arrays: dict[str, np.ndarray], parts: dict[str, type]) -
         case {"effect": name}:
             value = EFFECTS[str(name)]()
         case {"part": name, "state": state}:
-            value = build(parts[name], dict(zip(state, each(list(state.values())), strict=True)))
+            value = build_record(parts[name], dict(zip(state, each(list(state.values())), strict=True)))
         case _:
             value = decode_model(text, arrays)
     return value
 
 
-def build(part: type, state: dict[str, Any]) -> Any:
-    """Build a record from its fields. Raises TypeError for such as it has not."""
-    check(part, state)
+def build_record(part: type, state: dict[str, Any]) -> Any:
+    """Build a record from its fields. Raises TypeError for fields that it has not, or of another type."""
+    check_types(part, state)
     return part.from_saved(state) if hasattr(part, "from_saved") else part(**state)
 
 
-def check(kind: type, state: dict[str, Any]) -> None:
+def check_types(kind: type, state: dict[str, Any]) -> None:
     """Raise TypeError for an attribute that is not of its annotated type and shape; one letter is one size in all."""
     try:
         hints = get_type_hints(kind)

@@ -43,7 +43,7 @@ class Simulation:
         """
         inputs, outputs = ([c.name for c in part] for part in (self.channels.inputs, self.channels.outputs))
         taken = {*inputs, *outputs}
-        time = next(name for name in ("time", "t", "time in s", "seconds since the start") if name not in taken)
+        time = next(name for name in ("time", "t", "seconds") if name not in taken)
         yield [time, *inputs, *outputs, *(f"{name}_simulated" for name in outputs)]
         x, missing = self.experiment, [[""] * len(outputs)] * self.n_init
         for t, (u, y, y_hat) in enumerate(zip(x.u.tolist(), x.y.tolist(), missing + self.y_hat.tolist(), strict=True)):

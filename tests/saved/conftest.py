@@ -1,3 +1,3 @@
-"""The fixtures of the small data set and of the example models."""
+"""The fixture of the small data set."""
 
-from small_data import dataset, example, folder  # noqa: F401
+from small_data import dataset  # noqa: F401
