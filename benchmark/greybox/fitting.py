@@ -88,15 +88,21 @@ class Problem:
                 local[:, 2] = first[:, 0]
         return local
 
+    def within_reach(self, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Keep what terms remember between -1 and 1; beyond, nothing changes, and a fit would find no way back."""
+        remembered = slice(self.plant.order, self.plant.n_start)
+        local[:, remembered] = np.clip(local[:, remembered], -1.0, 1.0)
+        return local
+
     def other_side(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
         """Put each initial state, or the first reading, on the side of zero that suits the experiment better.
 
         A reading without a sign does not tell the two apart, and no descent leads from one to the other.
         """
         sides = np.ones(local.shape[1])
-        sides[: self.plant.n_start] = -1
+        sides[: self.plant.order] = -1
         guess = local.copy()
-        guess[:, : self.plant.n_start] = self.at_rest(theta)[:, : self.plant.n_start]
+        guess[:, : self.plant.order] = self.at_rest(theta)[:, : self.plant.order]
         starts = np.stack([local, local * sides, guess, guess * sides])  # [4, E, q]
         squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
         return starts[np.argmin(squares, axis=0), np.arange(len(local))]
@@ -106,9 +112,11 @@ class Problem:
         plant, which = self.plant, np.flatnonzero(which)
         sizes, high = self.sizes(theta), plant.high
         steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
-        unit = 1.0 if plant.imposed else self._sizes[0]
-        powers = [0 if plant.cascade or plant.imposed else i % 2 if plant.joint else i for i in range(plant.n_start)]
-        starts = [DIFFERENCE * unit * plant.dt**-power for power in powers]
+        powers = [0 if plant.cascade else i % 2 if plant.joint else i for i in range(plant.order)]
+        starts = [np.array(DIFFERENCE * self._sizes[0] * plant.dt**-power) for power in powers]
+        # Towards the middle: on its other side a start may be out of reach, and change nothing.
+        towards = np.where(local[:, plant.order : plant.n_start] > 0, -DIFFERENCE, DIFFERENCE)  # [E, m]
+        starts += list(towards.T)
         thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
@@ -128,7 +136,7 @@ class Problem:
             of_theta[i] = slope(moved, step)
         of_local = np.zeros((plant.n_local, len(here), m))
         for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
-            of_local[i] = slope(moved, step)
+            of_local[i] = slope(moved, step.reshape(-1, 1, 1))
         for i, term in enumerate(plant.per_experiment, start=plant.n_start):
             step = self._sizes[term.channel] / self.records.duration
             moved = local.copy()
@@ -225,7 +233,7 @@ class _Together:
         """Compute the squares after a damped step."""
         (step, local_step), _ = self._normal.step(self._inside, float(damping[0]))
         theta = np.clip(self.theta + step, self.problem.plant.low, self.problem.plant.high)
-        local = self.local + local_step
+        local = self.problem.within_reach(self.local + local_step)
         errors = self.problem.errors(theta, local)
         self._attempted = theta, local, errors
         return np.array([self.problem.squares(errors)])
@@ -260,7 +268,7 @@ class _OneByOne:
         """Compute the squares of these experiments after damped steps."""
         normal = self._normal.only(np.searchsorted(self._groups, groups))
         problem = self.problem.only(groups)
-        local = self.local[groups] + normal.steps_of_each(damping)
+        local = problem.within_reach(self.local[groups] + normal.steps_of_each(damping))
         errors = problem.errors(self.theta, local)
         squares = problem.squares_of_each(errors)
         self._attempted = groups, local, errors

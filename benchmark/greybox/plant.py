@@ -176,16 +176,15 @@ class Plant:
 
     @property
     def n_start(self) -> int:
-        """Length of the initial state: an imposed motion starts with what its forces remember, -1 to 1 each."""
-        return len(self.remembered) if self.imposed else self.order
+        """Length of the initial state: that of the plant, then one number for what each term remembers."""
+        return self.order + len(self.remembered)
 
     @cached_property
     def remembered(self) -> tuple[Term, ...]:
-        """The terms that an imposed motion finds in an unknown state, those of the input first."""
-        return tuple(
-            term for port in ("input", "force") for term in self.terms
-            if term.effect.port == port and term.effect.memory and term.effect.role != "friction"
-        )  # fmt: skip
+        """The terms in an unknown state at the start: those of the input, and of the force that a motion takes."""
+        found = [term for term in self.terms if term.effect.memory and term.effect.role != "friction"]
+        ports = ("input", "force") if self.imposed else ("input",)
+        return tuple(term for port in ports for term in found if term.effect.port == port)
 
     @property
     def n_local(self) -> int:
@@ -245,8 +244,11 @@ class Plant:
         carried = np.zeros(self.size)
         carried[: self.n_linear] = theta[: self.n_linear]
         numbers = np.zeros((len(local), self.n_local))
-        if self.n_start == smaller.n_start:
-            numbers[:, : self.n_start] = local[:, : self.n_start]
+        if self.order == smaller.order:
+            numbers[:, : self.order] = local[:, : self.order]
+        for i, term in enumerate(self.remembered, start=self.order):
+            if term in smaller.remembered:
+                numbers[:, i] = local[:, smaller.order + smaller.remembered.index(term)]
         for term in self.terms:
             if term not in smaller.terms:
                 continue

@@ -81,20 +81,20 @@ class Simulator:
             a = plant.matrix(theta)
             transition(a, self.h, e[i], g0[i], g1[i])
             rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
+        starts, begun = starts[:, :, :n], starts[:, :, n:]
         states = np.empty((s, experiments, samples, n))
         run, entry = (run_tanks_directly, 0) if plant.cascade else (run_body_directly, ENTRY if plant.joint else n - 1)
+        drives = np.stack([self.drive(*of_run) for of_run in zip(thetas, begun, strict=True)])
         run(
-            e, g0, g1, rates, entry, np.stack([self.drive(theta) for theta in thetas]), np.ascontiguousarray(starts),
-            self.substeps, self.h, self._terms, self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at,
-            self._memory, states,
+            e, g0, g1, rates, entry, drives, np.ascontiguousarray(starts), self.substeps, self.h, self._terms,
+            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
 
     def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
         """Compute the forces that the motion takes, and the rates of the drive."""
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
-        start = np.clip(start, -1.0, 1.0)
-        begun[:, self._remembered] = start[:, start.shape[1] - len(self._remembered) :]
+        begun[:, self._remembered] = np.clip(start[:, start.shape[1] - len(self._remembered) :], -1.0, 1.0)
         drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
         follow_motion(
             drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
@@ -107,7 +107,7 @@ class Simulator:
     ) -> tuple[Float[np.ndarray, "E T"], Float[np.ndarray, "E T"]]:
         """Simulate position and velocity, as the forces see them."""
         if self.plant.imposed:
-            x = self.arriving(theta, 0, np.clip(local, -1.0, 1.0))
+            x = self.arriving(theta, 0, local)
             return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
         states = self.states(theta[None], local[None, :, : self.plant.n_start])[0]
         return states[..., 0], states[..., min(1, self.plant.order - 1)]

@@ -174,7 +174,7 @@ class InputEffect(Effect):
 
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
-        """Return the same for records that start with this much in memory, -1 to 1; for terms that have any."""
+        """Return the same for records that start with this in memory, 0 in the middle; for terms that have any."""
         raise NotImplementedError
 
 
