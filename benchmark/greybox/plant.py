@@ -295,8 +295,3 @@ class Plant:
         if self.two_outputs:
             c[1, at + 1] = theta[self.layout.velocity][0]
         return c
-
-    @property
-    def forces(self) -> list[Term]:
-        """The terms that act in the plant."""
-        return [term for term in self.terms if term.effect.port == "force"]

@@ -50,7 +50,7 @@ class Simulator:
         self._u = np.ascontiguousarray(arriving)
         self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
-        forces = sorted(plant.forces, key=lambda term: ROLES.index(term.effect.role))
+        forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
         acting: list[Any] = [term.effect for term in forces]
