@@ -88,6 +88,14 @@ class Problem:
                 local[:, 2] = first[:, 0]
         return local
 
+    def better_start(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Let what terms remember begin at an end where that suits an experiment better: most come to rest there."""
+        remembered = slice(self.plant.order, self.plant.n_start)
+        starts = np.stack([local] * 3)  # [3, E, q]
+        starts[1, :, remembered], starts[2, :, remembered] = -1.0, 1.0
+        squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
+        return starts[np.argmin(squares, axis=0), np.arange(len(local))]
+
     def within_reach(self, local: np.ndarray) -> Float[np.ndarray, "E q"]:
         """Keep what terms remember between -1 and 1; beyond, nothing changes, and a fit would find no way back."""
         remembered = slice(self.plant.order, self.plant.n_start)
@@ -201,6 +209,8 @@ class Problem:
         local = self.at_rest(theta) if local is None else local.copy()
         if plant.sign_hidden:
             local = self.other_side(theta, local)
+        if plant.remembered and not plant.imposed:
+            local = self.better_start(theta, local)
         descent = _Together(self, theta, local, free) if free.any() else _OneByOne(self, theta, local)
         converged = minimise(descent, max_steps, tolerance)
         squares = self.squares(descent.errors)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 MOST_DAMPED = 1e10
-SHORT_STEPS = 3
+SHORT, SHORT_STEPS = 0.1, 3
 
 
 @runtime_checkable
@@ -35,7 +35,7 @@ def minimise(descent: Descent, max_steps: int, tolerance: float) -> Bool[np.ndar
     """Minimise the squares of every group, and tell which converged (Marquardt 1963; Ljung 1999, section 10.2).
 
     A group has converged when the quadratic model promises less than `tolerance` of the variance of its errors, when
-    three steps in a row gained less than that, the last one a millionth of it, or when no step downhill is left in
+    three steps in a row gained less than a tenth of that, the last one a millionth of it, or when no step downhill is left in
     floating point.
     """
     damping, converged = np.full(len(descent.squares), 1e-3), np.zeros(len(descent.squares), dtype=bool)
@@ -58,7 +58,7 @@ def minimise(descent: Descent, max_steps: int, tolerance: float) -> Bool[np.ndar
             descent.accept(good, now[better])
             gained = before[better] - now[better]
             moved[trying[better]] = gained >= 1e-6 * tolerance * before[better]
-            short[good] = np.where(gained < least[good], short[good] + 1, 0)
+            short[good] = np.where(gained < SHORT * least[good], short[good] + 1, 0)
             damping[good] = np.maximum(damping[good] / 10, 1e-12)
             damping[bad] = np.maximum(damping[bad] * 6, 1e-6)
             trying = trying[~better][damping[bad] < MOST_DAMPED]

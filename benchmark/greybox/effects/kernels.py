@@ -14,16 +14,11 @@ SOFT = 0.3
 
 
 @njit(cache=True, nogil=True)
-def stem(u, low, high, every, start):
-    """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it.
-
-    It begins at u + start [E] times that distance, where it sticks while start lies between -1 and 1.
-    """
+def stem(u, low, high, every):
+    """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it."""
     position = np.empty_like(u)
-    reach = high + SOFT * (high - low)
     for e in range(len(u)):
-        at = u[e, 0] + reach * start[e]
-        moving, last = 0.0, 0.0
+        at, moving, last = 0.0, 0.0, 0.0
         for k in range(0, u.shape[1], every):
             change, away = u[e, k] - last, u[e, k] - at
             last = u[e, k]

@@ -27,7 +27,6 @@ class ValveStiction(InputEffect):
         "Choudhury, Thornhill, Shah, Modelling valve stiction, Control Engineering Practice 13, 2005, fig. 5"
     )
     place_in_chain: ClassVar[int] = 60
-    memory: ClassVar[int] = 1
     contains: ClassVar[tuple[str, ...]] = ("backlash",)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "input")
     confounders: ClassVar[dict[str, str]] = {
@@ -85,10 +84,4 @@ class ValveStiction(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return the stem's position; before the record the command came from zero."""
-        reach = 0.5 * p[0] * (1 + p[1])
-        return ValveStiction.term_from(u, p, h, np.clip(-u[:, 0] / max(reach, 1e-300), -2.0, 2.0))
-
-    @staticmethod
-    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
-        """Return the stem's position where it begins this far from the command: 1 is as far as it sticks."""
-        return stem(u, 0.5 * p[0] * (1 - p[1]), 0.5 * p[0] * (1 + p[1]), max(1, round(p[2] / h)), start)
+        return stem(u, 0.5 * p[0] * (1 - p[1]), 0.5 * p[0] * (1 + p[1]), max(1, round(p[2] / h)))
