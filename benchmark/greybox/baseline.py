@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Plant, Term
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 MAX_STEPS = 40
@@ -80,6 +81,6 @@ class Baseline:
         """Fit a set of terms from several starts and return the best."""
         problem = self.problem(self.plant.having(terms))
         return min(
-            (problem.fit(*start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
+            (descend(problem, *start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
             key=lambda fit: fit.squares,
         )

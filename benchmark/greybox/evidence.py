@@ -12,11 +12,12 @@ import numpy as np
 from simgap.findings import VIEWS_OF_KINDS, Cause, Profile, Separation, Value, ViewName
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.effects.outliers import Outliers as OutlierEffect
-from simgap.greybox.fitting import Problem
+from simgap.greybox.fitting import descend
 from simgap.greybox.identification import Identified
 from simgap.greybox.intervals import intervals
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Term
+from simgap.greybox.problem import Problem
 from simgap.greybox.selection import Selection
 from simgap.greybox.trial import Trial, significant
 from simgap.records import Channels, Kind
@@ -201,7 +202,7 @@ class Evidence:
             for step in PROFILE:
                 theta = estimate.theta.copy()
                 theta[i] = np.clip(theta[i] + step * half, parameter.low, parameter.high)
-                fit = problem.fit(theta, estimate.local, fixed=fixed, max_steps=10)
+                fit = descend(problem, theta, estimate.local, fixed=fixed, max_steps=10)
                 points.append((float(theta[i]), max(0.0, n * math.log(fit.squares / estimate.squares))))
             values, deviance = zip(*sorted(points), strict=True)
             profiles.append(Profile(parameter.name, parameter.unit, values, deviance))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Problem
 from simgap.greybox.joint import is_better, on_joint, with_joint
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
@@ -17,6 +16,7 @@ from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
 from simgap.greybox.position_and_velocity import with_kind, with_velocity
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.selection import Selection, select
 from simgap.records import Channels, TrainingSet

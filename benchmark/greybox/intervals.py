@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from simgap.greybox.fitting import Problem
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.normal_equations import NormalEquations
+from simgap.greybox.problem import Problem
 
 BLOCKS = 40
 

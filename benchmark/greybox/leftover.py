@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.findings import Offer
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import white
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian
 from simgap.greybox.plant import Plant
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, sizes_of
 from simgap.greybox.simulation import Simulator
 from simgap.records import Channel

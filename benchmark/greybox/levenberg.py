@@ -35,8 +35,8 @@ def minimise(descent: Descent, max_steps: int, tolerance: float) -> Bool[np.ndar
     """Minimise the squares of every group, and tell which converged (Marquardt 1963; Ljung 1999, section 10.2).
 
     A group has converged when the quadratic model promises less than `tolerance` of the variance of its errors, when
-    three steps in a row gained less than a tenth of that, the last one a millionth of it, or when no step downhill is left in
-    floating point.
+    three steps in a row gained less than a tenth of that, the last one a millionth of it, or when no step downhill is
+    left in floating point.
     """
     damping, converged = np.full(len(descent.squares), 1e-3), np.zeros(len(descent.squares), dtype=bool)
     short = np.zeros(len(descent.squares), dtype=int)  # steps in a row that gained next to nothing

@@ -10,11 +10,13 @@ import numpy as np
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
-from simgap.greybox.fitting import Estimate, Problem, initial_states
+from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.initial_states import initial_states
 from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import fit_plain
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import RESOLUTION, Records, excerpts
 from simgap.greybox.score_test import add, candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
@@ -166,7 +168,7 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
         theta[getattr(plant.layout, name)] = held.theta[getattr(before.layout, name)]
     theta[plant.layout.zeros][: before.zeros] = held.theta[before.layout.zeros]
     theta[plant.layout.gains][:: len(taps)] = held.theta[before.layout.gains]
-    return Problem(plant, train, noise).fit(theta, held.local)
+    return descend(Problem(plant, train, noise), theta, held.local)
 
 
 def errors_on(fit: Estimate, records: Records, n_init: int) -> np.ndarray:

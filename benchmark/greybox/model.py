@@ -11,10 +11,12 @@ from jaxtyping import Float
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import SignalScales
-from simgap.greybox.fitting import Estimate, Problem, initial_states
+from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
 from simgap.records import LARGEST_VALUE, Experiment
@@ -36,10 +38,10 @@ class FittedPlant:
         """Fit a model that was found on excerpts to all of the experiments."""
         records = Records.of(experiments, baseline.outputs)
         fixed = np.ones(len(start.theta), dtype=bool)
-        first = Problem(start.plant, records, baseline.noise).fit(start.theta, fixed=fixed)
+        first = descend(Problem(start.plant, records, baseline.noise), start.theta, fixed=fixed)
         if baseline.outliers:
             records = without_outliers(records, first.errors, baseline.outliers)
-        estimate = Problem(start.plant, records, baseline.noise).fit(start.theta, first.local)
+        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local)
         return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers)
 
     def saved_state(self) -> dict[str, Any]:
@@ -67,18 +69,32 @@ class FittedPlant:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate rows n .. T-1, from the initial state that suits the n measured samples best."""
+        start = self._start(u, y_init)
+        return Simulator(self.forecasting, u).run(self.estimate.theta, start)[:, y_init.shape[1] :]
+
+    def _start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
+        """Find the initial states: from the first n samples, and from where the training records start."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
-        start = initial_states(plant, theta, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
-        return Simulator(plant, u).run(theta, start)[:, n:]
+        beginning = Records.measured(u[:, :n], y_init, plant.dt)
+        found = initial_states(plant, theta, beginning, self.noise)
+        if n not in self._usual:
+            self._usual[n] = usual_start(plant, self.estimate, self.records, self.noise, n)
+        usual = self._usual[n]
+        return usual.beside(Problem(plant, beginning, self.noise), theta, found) if usual else found
+
+    @cached_property
+    def _usual(self) -> dict[int, UsualStart | None]:
+        """The usual start beside so many first samples."""
+        return {}
 
     def contributions(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T e"]:
         """Simulate what each effect does to the first output: all effects less all but it, from the same start."""
-        plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
+        plant, theta = self.forecasting, self.estimate.theta
         if not plant.terms:
             return np.zeros((*u.shape[:2], 0))
-        start = initial_states(plant, theta, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
+        start = self._start(u, y_init)
         whole = Simulator(plant, u).run(theta, start)
         contributions = []
         for term in plant.terms:

@@ -7,9 +7,10 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 FINALISTS = 2
@@ -33,14 +34,14 @@ def fit_plain(
         theta = np.zeros(plant.size)
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0
-        solved = problem.fit(theta, fixed=~linear, max_steps=2)
+        solved = descend(problem, theta, fixed=~linear, max_steps=2)
         tried.append((solved.squares, solved.theta, solved.local))
     tried.sort(key=lambda trial: trial[0])
-    fits = [problem.fit(theta, local) for _, theta, local in tried[:FINALISTS]]
+    fits = [descend(problem, theta, local) for _, theta, local in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
     # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
-    return Problem(plant, records, noise).fit(best.theta, best.local)
+    return descend(Problem(plant, records, noise), best.theta, best.local)
 
 
 def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int, tolerance: float) -> Estimate:
@@ -59,11 +60,11 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
             theta[plant.layout.poles] = shape
             if not plant.imposed:
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
-            tried.append(problem.fit(theta, fixed=~gains, max_steps=2, tolerance=1.0))
+            tried.append(descend(problem, theta, fixed=~gains, max_steps=2, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)
-    fits = [problem.fit(t.theta, t.local, max_steps=max_steps, tolerance=tolerance) for t in tried[:FINALISTS]]
+    fits = [descend(problem, t.theta, t.local, max_steps=max_steps, tolerance=tolerance) for t in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
-    return problem.fit(best.theta, best.local) if plant.sign_hidden else best
+    return descend(problem, best.theta, best.local) if plant.sign_hidden else best
 
 
 def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:

@@ -202,7 +202,7 @@ def compare(
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _race(baseline, begun[:FINALISTS], worth)
+    finalists = _simplified(baseline, _race(baseline, begun[:FINALISTS], worth))
     compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
 
@@ -223,6 +223,24 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
         for i, fit in zip(running, in_threads(go_on, [fits[i] for i in running]), strict=True):
             fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
     return fits
+
+
+def _simplified(baseline: Baseline, fits: list[Estimate]) -> list[Estimate]:
+    """Fit the special cases of the best effect once more, beginning with its plant: theirs may be another minimum."""
+    if not fits:
+        return fits
+    best = min(fits, key=lambda fit: _cost(baseline, fit))
+    contained = best.plant.terms[-1].effect.contains
+
+    def once_more(fit: Estimate) -> Estimate:
+        plant, term = fit.plant, fit.plant.terms[-1]
+        if term.effect.name not in contained:
+            return fit
+        theta, local = plant.carry(best.plant, best.theta, best.local)
+        theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
+        return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
+
+    return in_threads(once_more, fits)
 
 
 def _cost(baseline: Baseline, fit: Estimate) -> float:

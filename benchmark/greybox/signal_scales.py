@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.effects.effect import SignalScales
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.plant import PlantScales
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.records import Channels
 

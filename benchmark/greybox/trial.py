@@ -10,9 +10,10 @@ from scipy.stats import chi2
 
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Estimate, Problem
+from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import log_likelihood
 from simgap.greybox.plant import Term
+from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, candidates
 
 # The chance, over the whole catalogue, that noise alone passes for an effect.
@@ -67,7 +68,7 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     plant, valid = estimate.plant, baseline.valid
     fixed = np.ones(plant.size, dtype=bool)
     problem = Problem(plant, valid, baseline.noise)
-    on_valid = problem.fit(estimate.theta, fixed=fixed, max_steps=10)
+    on_valid = descend(problem, estimate.theta, fixed=fixed, max_steps=10)
     squares = np.where(valid.mask[:, :, None], baseline.noise.whiten(on_valid.errors) ** 2 + problem.least, 0.0)
     blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
     return Trial(

@@ -4,11 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simgap.greybox import fitting, noise, outliers, signal_scales
+from simgap.greybox import initial_states as starts
+from simgap.greybox import noise, outliers, signal_scales
 from simgap.greybox.effects.effect import SignalScales
-from simgap.greybox.fitting import Problem
+from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
 from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.records import Channel, Channels, Experiment
 from simgap.registry import EFFECTS
@@ -140,7 +142,7 @@ def step(of_theta, of_own, errors, inside, damping):
 
 def fitted(made, data, weighing, fixed=None):
     """Theta and own numbers of a fit that begins at the model's theta."""
-    found = Problem(made.plant, data, weighing).fit(made.theta, fixed=fixed)
+    found = descend(Problem(made.plant, data, weighing), made.theta, fixed=fixed)
     return found.theta, found.local
 
 
@@ -149,13 +151,13 @@ def own_numbers_of_each(made, data, weighing):
     alone = [Records(data.u[i : i + 1], data.y[i : i + 1], data.mask[i : i + 1], data.dt) for i in range(len(data.u))]
     fixed = np.ones(len(made.theta), dtype=bool)
     return np.concatenate(
-        [Problem(made.plant, one, weighing).fit(made.theta, fixed=fixed, max_steps=15).local for one in alone]
+        [descend(Problem(made.plant, one, weighing), made.theta, fixed=fixed, max_steps=15).local for one in alone]
     )
 
 
 def initial_states(made, data, weighing):
     """The states [E, q] at the first sample of each record."""
-    return fitting.initial_states(made.plant, made.theta, data, weighing)
+    return starts.initial_states(made.plant, made.theta, data, weighing)
 
 
 # ------------------------------------------------------------------ what is seen before and after a search

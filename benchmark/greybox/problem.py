@@ -1,0 +1,174 @@
+"""What a fit minimises: a plant with the records that it simulates, its errors and their slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.greybox import two_masses
+from simgap.greybox.noise import Noise
+from simgap.greybox.normal_equations import Jacobian
+from simgap.greybox.plant import Plant
+from simgap.greybox.samples import RESOLUTION, Records
+from simgap.greybox.simulation import Simulator
+
+# In sizes of the output: the error of a simulation that grows without bound; its square is still a number.
+LARGEST_ERROR = 1e60
+SMALL = 1e-3  # share of the size of other numbers that a number near zero counts as
+DIFFERENCE = 1e-5  # of a parameter's size: the step of its numerical slope
+SLOWEST = 1e-6  # share of a sample's change by which a tank empties that counts as one at all
+
+
+class Problem:
+    """A plant with the records that it is fitted to, and the noise that weighs its errors."""
+
+    def __init__(self, plant: Plant, records: Records, noise: Noise) -> None:
+        self.plant, self.records, self.noise = plant, records, noise
+        self.simulator = Simulator(plant, records.u)
+        # The readings in training tell the sizes of the outputs, not the few samples that may be at hand.
+        self._sizes = plant.scales.output_sizes[: plant.ny] if plant.scales else records.sizes
+        # What rounding adds to the square of each reading: a perfect fit has that, and none is better. [ny]
+        self.least = (RESOLUTION * self._sizes / noise.deviations) ** 2
+        self._measured = records.mask[:, :, None]
+
+    def only(self, experiments: np.ndarray) -> Problem:
+        """Return the same problem for some of the experiments."""
+        return (
+            self
+            if len(experiments) == len(self.records.u)
+            else Problem(self.plant, self.records.only(experiments), self.noise)
+        )
+
+    def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
+        """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
+        errors = np.where(self._measured, self.records.y - self.simulator.run(theta, local), 0.0)
+        if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR * self._sizes.min():  # nor when it is not a number
+            largest = LARGEST_ERROR * self._sizes
+            errors = np.clip(np.where(np.isnan(errors), largest, errors), -largest, largest)
+        return errors
+
+    def squares(self, errors: np.ndarray) -> float:
+        """Sum the squares of the whitened errors, and what rounding adds to them."""
+        white = self.noise.whiten(errors)
+        return float(np.vdot(white, white)) + float(self.least.sum()) * self.records.samples
+
+    def squares_of_each(self, errors: np.ndarray) -> Float[np.ndarray, " E"]:
+        """Sum the squares of the whitened errors of each experiment."""
+        rounding = self.least.sum() * self.records.mask.sum(axis=1)
+        return np.sum(self.noise.whiten(errors) ** 2, axis=(1, 2)) + rounding
+
+    def at_rest(self, theta: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Guess the initial states of a plant that stood at its first reading."""
+        plant, first = self.plant, self.records.y[:, 0]
+        local = np.zeros((len(first), plant.n_local))
+        if plant.cascade:
+            local[:, plant.order - 1] = first[:, 0]
+            for i in range(plant.order - 2, -1, -1):
+                rate = max(theta[i], SLOWEST / plant.dt)
+                local[:, i] = local[:, i + 1] * theta[i + 1] / rate
+        elif plant.order:
+            local[:, 0] = first[:, 0]
+            if plant.joint:
+                local[:, 2] = first[:, 0]
+        return local
+
+    def better_start(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Let what terms remember begin at an end where that suits an experiment better: most come to rest there."""
+        remembered = slice(self.plant.order, self.plant.n_start)
+        starts = np.stack([local] * 3)  # [3, E, q]
+        starts[1, :, remembered], starts[2, :, remembered] = -1.0, 1.0
+        squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
+        return starts[np.argmin(squares, axis=0), np.arange(len(local))]
+
+    def within_reach(self, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Keep what terms remember between -1 and 1; beyond, nothing changes, and a fit would find no way back."""
+        remembered = slice(self.plant.order, self.plant.n_start)
+        local[:, remembered] = np.clip(local[:, remembered], -1.0, 1.0)
+        return local
+
+    def other_side(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
+        """Put each initial state, or the first reading, on the side of zero that suits the experiment better.
+
+        A reading without a sign does not tell the two apart, and no descent leads from one to the other.
+        """
+        sides = np.ones(local.shape[1])
+        sides[: self.plant.order] = -1
+        guess = local.copy()
+        guess[:, : self.plant.order] = self.at_rest(theta)[:, : self.plant.order]
+        starts = np.stack([local, local * sides, guess, guess * sides])  # [4, E, q]
+        squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
+        return starts[np.argmin(squares, axis=0), np.arange(len(local))]
+
+    def jacobian(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Jacobian:
+        """Differentiate the simulation by forward differences, for the parameters `which` of theta."""
+        plant, which = self.plant, np.flatnonzero(which)
+        sizes, high = self.sizes(theta), plant.high
+        steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
+        powers = [0 if plant.cascade else i % 2 if plant.joint else i for i in range(plant.order)]
+        starts = [np.array(DIFFERENCE * self._sizes[0] * plant.dt**-power) for power in powers]
+        # Towards the middle: on its other side a start may be out of reach, and change nothing.
+        towards = np.where(local[:, plant.order : plant.n_start] > 0, -DIFFERENCE, DIFFERENCE)  # [E, m]
+        starts += list(towards.T)
+        thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
+        locals_ = np.repeat(local[None], len(thetas), axis=0)
+        for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
+            thetas[row, i] += step
+        for i, step in enumerate(starts):
+            locals_[1 + len(steps) + i, :, i] += step
+        here, *there = self.simulator.run_many(thetas, locals_)
+        m = here.shape[1] * here.shape[2]
+
+        def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
+            with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
+                change = np.where(self._measured, (moved - here) / step, 0.0)
+                return self.noise.whiten(change).reshape(len(here), m)
+
+        of_theta = np.zeros((len(theta), len(here), m))
+        for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):
+            of_theta[i] = slope(moved, step)
+        of_local = np.zeros((plant.n_local, len(here), m))
+        for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
+            of_local[i] = slope(moved, step.reshape(-1, 1, 1))
+        for i, term in enumerate(plant.per_experiment, start=plant.n_start):
+            step = self._sizes[term.channel] / self.records.duration
+            moved = local.copy()
+            moved[:, i] += step
+            of_local[i] = slope(self.simulator.run(theta, moved), step)
+        return Jacobian(of_theta, of_local)
+
+    def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:
+        """Return the size of each parameter, to which the step of its finite difference is proportional.
+
+        One that is near zero has a share of what would be its size beside the others', in its own unit.
+        """
+        plant, layout, records = self.plant, self.plant.layout, self.records
+        poles = np.abs(theta[layout.poles])
+        slowest, speed = 1 / records.duration, 1.0
+        natural = np.empty(len(poles))
+        if plant.joint:
+            natural = two_masses.natural_sizes(poles, slowest)
+            speed = natural[1]
+        for first in range(0, 0 if plant.joint else len(poles), 1 if plant.cascade else 2):
+            section = poles[first : first + (1 if plant.cascade else 2)]  # s + a, or s^2 + a1 s + a0
+            rate = max(slowest, section[0], np.sqrt(section[-1]) if len(section) == 2 else 0.0)
+            natural[first : first + len(section)] = [rate, rate * rate][: len(section)]
+            speed *= rate ** len(section)
+        sizes = np.abs(theta)
+        sizes[layout.poles] = np.maximum(poles, SMALL * natural)
+        inputs = np.repeat(records.input_sizes, len(plant.taps))
+        drives = np.concatenate((sizes[layout.gains] * inputs, sizes[layout.offset]))
+        drive = SMALL * max(np.max(drives), SMALL * speed * self._sizes[0])
+        sizes[layout.gains] = np.maximum(sizes[layout.gains], drive / inputs)
+        sizes[layout.offset] = np.maximum(sizes[layout.offset], drive)
+        sizes[layout.zeros] = np.maximum(sizes[layout.zeros], SMALL * plant.dt ** np.arange(1.0, 1 + plant.zeros))
+        sizes[layout.velocity] = np.maximum(sizes[layout.velocity], SMALL * self._sizes[-1] / self._sizes[0] * plant.dt)
+        for term in plant.terms:
+            if term in plant.per_experiment:
+                continue
+            at = plant.part_of(term)
+            starts = [abs(np.array(start.values)) for start in plant.starts_of(term)]
+            if starts:
+                usual = 0.1 * np.median(starts, axis=0)
+                reach = np.array([p.high - p.low for p in plant.parameters_of(term)])
+                sizes[at] = np.maximum(sizes[at], np.where(usual > 0, usual, SMALL * reach))
+        return np.where(sizes > 0, sizes, SMALL)
