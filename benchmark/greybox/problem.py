@@ -16,6 +16,7 @@ from simgap.greybox.simulation import Simulator
 LARGEST_ERROR = 1e60
 SMALL = 1e-3  # share of the size of other numbers that a number near zero counts as
 DIFFERENCE = 1e-5  # of a parameter's size: the step of its numerical slope
+MEMORIES = np.linspace(-1.0, 1.0, 9)  # from which the memory of a term may begin
 SLOWEST = 1e-6  # share of a sample's change by which a tank empties that counts as one at all
 
 
@@ -73,10 +74,9 @@ class Problem:
         return local
 
     def better_start(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E q"]:
-        """Let what terms remember begin at an end where that suits an experiment better: most come to rest there."""
-        remembered = slice(self.plant.order, self.plant.n_start)
-        starts = np.stack([local] * 3)  # [3, E, q]
-        starts[1, :, remembered], starts[2, :, remembered] = -1.0, 1.0
+        """Let what terms remember begin elsewhere where that suits an experiment better; no descent may lead there."""
+        starts = np.stack([local] * (1 + len(MEMORIES)))  # [1 + m, E, q]
+        starts[1:, :, self.plant.order : self.plant.n_start] = MEMORIES[:, None, None]
         squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
         return starts[np.argmin(squares, axis=0), np.arange(len(local))]
 

@@ -10,10 +10,11 @@ from typing import TypeVar
 
 import numba
 
-from simgap.greybox.baseline import MAX_STEPS, Baseline
+from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
+from simgap.greybox.pole_search import refit_from_poles
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, jacobian_of
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
@@ -29,6 +30,7 @@ MAX_TERMS = 5
 FEW_STEPS = 6
 FINALISTS = 8
 MORE_STEPS = 8  # until they are compared again
+STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 
 Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
 
@@ -202,7 +204,7 @@ def compare(
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _simplified(baseline, _race(baseline, begun[:FINALISTS], worth))
+    finalists = _anew(baseline, _race(baseline, begun[:FINALISTS], worth), before)
     compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
 
@@ -225,14 +227,21 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
     return fits
 
 
-def _simplified(baseline: Baseline, fits: list[Estimate]) -> list[Estimate]:
-    """Fit the special cases of the best effect once more, beginning with its plant: theirs may be another minimum."""
+def _anew(baseline: Baseline, fits: list[Estimate], before: float) -> list[Estimate]:
+    """Fit the best effect from other poles too where it takes most of the error, and its special cases from its plant.
+
+    The poles that the model had before stood in for the effect, and no descent may lead away from them.
+    """
     if not fits:
         return fits
     best = min(fits, key=lambda fit: _cost(baseline, fit))
+    others = [fit for fit in fits if fit is not best]
+    if best.squares < STOOD_IN * before and not best.plant.joint:
+        afresh = refit_from_poles(baseline.problem(best.plant), [best.theta], MAX_STEPS, TOLERANCE)
+        best = min(best, afresh, key=lambda fit: fit.squares)
     contained = best.plant.terms[-1].effect.contains
 
-    def once_more(fit: Estimate) -> Estimate:
+    def from_best(fit: Estimate) -> Estimate:
         plant, term = fit.plant, fit.plant.terms[-1]
         if term.effect.name not in contained:
             return fit
@@ -240,7 +249,7 @@ def _simplified(baseline: Baseline, fits: list[Estimate]) -> list[Estimate]:
         theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
         return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
 
-    return in_threads(once_more, fits)
+    return [best, *in_threads(from_best, others)]
 
 
 def _cost(baseline: Baseline, fit: Estimate) -> float:

@@ -14,11 +14,14 @@ SOFT = 0.3
 
 
 @njit(cache=True, nogil=True)
-def stem(u, low, high, every):
-    """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it."""
+def stem(u, low, high, every, begun, before):
+    """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it.
+
+    It stands at `begun` [E] and the last command was `before` [E].
+    """
     position = np.empty_like(u)
     for e in range(len(u)):
-        at, moving, last = 0.0, 0.0, 0.0
+        at, moving, last = begun[e], 0.0, before[e]
         for k in range(0, u.shape[1], every):
             change, away = u[e, k] - last, u[e, k] - at
             last = u[e, k]

@@ -28,6 +28,7 @@ class ValveStiction(InputEffect):
     )
     place_in_chain: ClassVar[int] = 60
     contains: ClassVar[tuple[str, ...]] = ("backlash",)
+    memory: ClassVar[int] = 1
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "input")
     confounders: ClassVar[dict[str, str]] = {
         "backlash": (
@@ -84,4 +85,15 @@ class ValveStiction(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return the stem's position; before the record the command came from zero."""
-        return stem(u, 0.5 * p[0] * (1 - p[1]), 0.5 * p[0] * (1 + p[1]), max(1, round(p[2] / h)))
+        return ValveStiction.stem_from(u, p, h, np.zeros(len(u)), np.zeros(len(u)))
+
+    @staticmethod
+    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
+        """Return the same of a stem at rest as far from the command as it sticks (-1, 1) or nearer."""
+        return ValveStiction.stem_from(u, p, h, u[:, 0] + 0.5 * p[0] * (1 + p[1]) * start, u[:, 0])
+
+    @staticmethod
+    def stem_from(u: np.ndarray, p: np.ndarray, h: float, at: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return the position of a stem that stands somewhere, from the command before."""
+        low, high = 0.5 * p[0] * (1 - p[1]), 0.5 * p[0] * (1 + p[1])
+        return stem(u, low, high, max(1, round(p[2] / h)), at, before)
