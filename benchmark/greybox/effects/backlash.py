@@ -8,6 +8,7 @@ import numpy as np
 
 from simgap.findings import ViewName
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.kernels import behind_gap
 from simgap.registry import EFFECTS
 
 
@@ -63,19 +64,9 @@ class Backlash(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u behind a gap of width p[0]; before the record the input came from zero."""
-        return Backlash.behind_gap(u, p, np.zeros(len(u)))
+        return behind_gap(u, p[0], np.zeros(len(u)))
 
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
         """Return u behind a gap in which each record begins at -1 (one side) to 1 (the other)."""
-        return Backlash.behind_gap(u, p, u[:, 0] + 0.5 * p[0] * start)
-
-    @staticmethod
-    def behind_gap(u: np.ndarray, p: np.ndarray, output: np.ndarray) -> np.ndarray:
-        """Return u behind a gap, from the output before."""
-        low, high = u - 0.5 * p[0], u + 0.5 * p[0]
-        outputs = np.empty_like(u)
-        for k in range(u.shape[1]):
-            output = np.minimum(np.maximum(output, low[:, k]), high[:, k])
-            outputs[:, k] = output
-        return outputs
+        return behind_gap(u, p[0], u[:, 0] + 0.5 * p[0] * start)

@@ -14,6 +14,18 @@ SOFT = 0.3
 
 
 @njit(cache=True, nogil=True)
+def behind_gap(u, gap, begun):
+    """Compute what follows u [E, K] behind a gap, from `begun` [E] on: the play operator."""
+    position = np.empty_like(u)
+    for e in range(len(u)):
+        at = begun[e]
+        for k in range(u.shape[1]):
+            at = min(max(at, u[e, k] - 0.5 * gap), u[e, k] + 0.5 * gap)
+            position[e, k] = at
+    return position
+
+
+@njit(cache=True, nogil=True)
 def stem(u, low, high, every, begun, before):
     """Compute the position [E, K] of a stem that sticks up to a distance `high` from u and moves `low` behind it.
 
