@@ -160,6 +160,17 @@ def initial_states(made, data, weighing):
     return starts.initial_states(made.plant, made.theta, data, weighing)
 
 
+def problem_of(made, data, weighing):
+    """The plant with records."""
+    return Problem(made.plant, data, weighing)
+
+
+def usual_start(made, data, weighing, n_init):
+    """Where the records start beside their first samples, as a fit of their initial states tells it."""
+    estimate = descend(Problem(made.plant, data, weighing), made.theta, fixed=np.ones(len(made.theta), dtype=bool))
+    return starts.usual_start(made.plant, estimate, data, weighing, n_init)
+
+
 # ------------------------------------------------------------------ what is seen before and after a search
 
 

@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from .parts import fitted, initial_states, model, own_numbers_of_each, records, signless, simulated, white_noise
+from .parts import (
+    fitted,
+    initial_states,
+    model,
+    own_numbers_of_each,
+    problem_of,
+    records,
+    signless,
+    simulated,
+    usual_start,
+    white_noise,
+)
 from .plants import free_run, position, steps, tanks, third_order, velocity
 
 # Plant, and the model of it: kind and shape (poles section by section, or outflows), gain.
@@ -80,3 +91,61 @@ def test_a_sensor_without_a_sign_starts_on_either_side_but_simulates_the_same_re
     readings = np.abs(free_run(velocity(), u, 0.1, start)[0])
     found = initial_states(known, records(u, readings, 0.1), white_noise(0.01))
     np.testing.assert_allclose(found, start, atol=1e-3)  # the input tells the side
+
+
+def behind_play(u, gap, begun):
+    """The play operator, from where in its gap each record begins (-1 to 1)."""
+    at, followed = u[:, 0] + 0.5 * gap * begun, np.empty_like(u)
+    for k in range(u.shape[1]):
+        at = np.clip(at, u[:, k] - 0.5 * gap, u[:, k] + 0.5 * gap)
+        followed[:, k] = at
+    return followed
+
+
+def test_where_in_its_gap_a_drive_with_play_begins_is_found():
+    known = model("velocity", 0.1, [1.5], 2.0, ("backlash",))
+    gap, begun = known.theta[-1], np.array([-1.0, -0.6, 0.0, 0.3, 1.0])
+    u = 1.5 * gap * steps(np.random.default_rng(3), (5, 80))
+    u[:, :6] = 0.0  # nothing is crossed in the first samples
+    start = np.linspace(-1.0, 1.0, 5)[:, None]
+    y, _ = free_run(velocity(), behind_play(u, gap, begun), 0.1, start)
+    data = records(u, y, 0.1)
+    found = initial_states(known, data, white_noise(0.01 * float(np.std(y))))
+    np.testing.assert_allclose(simulated(known, data, found), y, atol=0.02 * float(np.std(y)))
+    np.testing.assert_allclose(found[:, 1], begun, atol=0.05)
+
+
+def axis(rng, start):
+    """Records of an axis without a spring from known states, noise of 0.1 added: model, records, true motion."""
+    known = model("position", 0.1, [1.2, 0.0], 3.0)
+    u = steps(rng, (len(start), 300))
+    y, _ = free_run(position(stiffness=0.0), u, 0.1, start)
+    return known, records(u, y + 0.1 * rng.standard_normal(y.shape), 0.1), y
+
+
+def errors_of_free_runs(start):
+    """RMSE of the free runs of six further records from ten noisy samples, without and with what training taught."""
+    rng = np.random.default_rng(4)
+    known, training, _ = axis(rng, start(rng, 12))
+    usual = usual_start(known, training, white_noise(0.1), 10)
+    _, others, y = axis(rng, start(rng, 6))
+    beginning = others.beginning(10)
+    both = [initial_states(known, beginning, white_noise(0.1))]
+    if usual is not None:
+        both.append(usual.beside(problem_of(known, beginning, white_noise(0.1)), known.theta, both[0]))
+    return [float(np.sqrt(np.mean((simulated(known, others, local) - y) ** 2))) for local in both]
+
+
+def test_where_all_records_start_at_rest_the_next_one_does():
+    without, within = errors_of_free_runs(lambda rng, n: np.zeros((n, 2)))
+    assert within < 0.3 * without
+
+
+def test_where_records_start_anywhere_the_first_samples_decide():
+    errors = errors_of_free_runs(lambda rng, n: 20 * rng.standard_normal((n, 2)))
+    assert max(errors) < 1.1 * min(errors)
+
+
+def test_few_records_have_no_usual_start():
+    known, data, _ = axis(np.random.default_rng(5), np.zeros((4, 2)))
+    assert usual_start(known, data, white_noise(0.1), 10) is None

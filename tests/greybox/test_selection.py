@@ -71,3 +71,9 @@ def test_what_the_readings_seemed_to_show_must_pass_against_the_rest_too():
 )
 def test_every_effect_of_the_answer_passes_alone_against_the_rest(rig, effects):
     assert passing_alone(hide(rig, effects, noise=0.05, seed=3).training) >= set(effects)
+
+
+@pytest.mark.slow
+def test_a_special_case_of_the_best_effect_is_fitted_from_its_plant_too():
+    # A valve that sticks and does not jump is play; seen from the poles of the plain model, play fits worse.
+    assert passing_alone(hide("tanks", {"backlash": 1.0}, noise=0.05, seed=304).training) == {"backlash"}
