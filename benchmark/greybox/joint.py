@@ -9,47 +9,66 @@ import numpy as np
 
 from simgap.greybox import two_masses
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Estimate
+from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.linear import WORTH_AN_ORDER, block_errors, scaled
 from simgap.greybox.noise import schwarz_order
-from simgap.greybox.plant import Plant
+from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import fit_plain
+from simgap.greybox.problem import Problem
 from simgap.greybox.selection import BETTER, Selection
 from simgap.greybox.trial import MATTERS, assess
 from simgap.records import Channels
+from simgap.registry import EFFECTS
 
 FEWEST_SAMPLES = 50  # of a record that may show how a joint swings
 SIDES: tuple[two_masses.Side, ...] = ("motor", "load")
 
 
-def with_joint(baseline: Baseline, channels: Channels, n_init: int) -> Baseline | None:
+def with_joint(rigid: Selection, channels: Channels, n_init: int) -> Baseline | None:
     """Put a flexible joint into a drive whose position is measured, on either side; None where none is seen to swing.
 
-    It must lower the held-out error as a higher order must, by more than a standard error.
+    It must lower the held-out error as a higher order must, by more than a standard error. Where the rigid drive is
+    late, one that is late too is tried as well, because a delay hides how a joint swings.
     """
-    rigid, records, dt = baseline.plant, baseline.train, baseline.plant.dt
-    if rigid.kind != "position" or rigid.order != 2 or rigid.joint or len(records.u[0]) < FEWEST_SAMPLES:
+    baseline, chosen = rigid.baseline, rigid.trial.estimate
+    plant, records, dt = baseline.plant, baseline.train, baseline.plant.dt
+    if plant.kind != "position" or plant.order != 2 or plant.joint or len(records.u[0]) < FEWEST_SAMPLES:
         return None
-    poles = baseline.estimate.theta[rigid.layout.poles]
-    tried = []
-    shapes = list(two_masses.shapes(poles, records.duration, dt))
-    for side in SIDES:
-        plant = Plant(
-            "position", 4, rigid.nu, dt, two_outputs=rigid.two_outputs, offset=rigid.offset, taps=rigid.taps, joint=side
-        )
-        fit = fit_plain(plant, records, shapes=shapes)
-        shapes = [*shapes[::4], list(fit.theta[plant.layout.poles])]  # both sides have the same poles
-        if two_masses.swings(fit.theta[plant.layout.poles], records.duration, dt):
-            tried.append(fit)
-    before = block_errors(baseline.estimate, baseline.valid, n_init)
-    errors = [block_errors(fit, baseline.valid, n_init) for fit in tried]
-    best = min(range(len(tried)), key=lambda i: float(errors[i].mean()), default=None)
+    poles = baseline.estimate.theta[plant.layout.poles]
+    best, most = None, 0.0
+    for delay in ((), *_delays(chosen)):
+        to_beat = block_errors(chosen if delay else baseline.estimate, baseline.valid, n_init)
+        shapes = list(two_masses.shapes(poles, records.duration, dt))
+        for side in SIDES:
+            joint = Plant(
+                "position", 4, plant.nu, dt, two_outputs=plant.two_outputs, offset=plant.offset, taps=plant.taps,
+                joint=side,
+            )  # fmt: skip
+            if delay:
+                joint = replace(joint, scales=plant.scales).having([Term(EFFECTS["input_delay"]())])
+            fit = fit_plain(joint, records, shapes=shapes, of_terms=delay)
+            shapes = [*shapes[::4], list(fit.theta[joint.layout.poles])]  # both sides have the same poles
+            gain = to_beat - block_errors(fit, baseline.valid, n_init)
+            seen = two_masses.swings(fit.theta[joint.layout.poles], records.duration, dt)
+            enough = gain.mean() > max(WORTH_AN_ORDER * to_beat.mean(), gain.std() / math.sqrt(len(gain)))
+            if seen and enough and gain.mean() / to_beat.mean() > most:
+                best, most = fit, float(gain.mean() / to_beat.mean())
     if best is None:
         return None
-    gain = before - errors[best]
-    if not gain.mean() > max(WORTH_AN_ORDER * before.mean(), gain.std() / math.sqrt(len(gain))):
-        return None
-    return replace(baseline, estimate=scaled(tried[best], records, channels, baseline.outputs))
+    without = best.plant.having(())
+    fit = descend(Problem(without, records, baseline.noise), best.theta[: without.size])
+    return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
+
+
+def _delays(chosen: Estimate) -> tuple[tuple[float], ...]:
+    """List delays, in s, to begin with, as the delay and lags of a rigid drive tell; a joint may be part of them."""
+    plant = chosen.plant
+    late = sum(
+        float(chosen.theta[plant.part_of(term)][0])
+        for term in plant.terms
+        if term.effect.linear and plant.parameters_of(term)[0].unit == "s"
+    )
+    return tuple((share * late,) for share in (0.4, 0.8)) if late else ()
 
 
 def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:

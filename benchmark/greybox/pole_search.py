@@ -18,9 +18,16 @@ LARGEST_RATIO = 1e6
 
 
 def fit_plain(
-    plant: Plant, records: Records, smaller: Estimate | None = None, shapes: Sequence[list[float]] | None = None
+    plant: Plant,
+    records: Records,
+    smaller: Estimate | None = None,
+    shapes: Sequence[list[float]] | None = None,
+    of_terms: Sequence[float] = (),
 ) -> Estimate:
-    """Fit a plain linear model from the best poles of a grid, or from those of a smaller model and one more."""
+    """Fit a plain linear model from the best poles of a grid, or from those of a smaller model and one more.
+
+    With a delay it is linear too; `of_terms` holds the parameters of the terms to begin with.
+    """
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
     tried = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
@@ -34,6 +41,7 @@ def fit_plain(
         theta = np.zeros(plant.size)
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0
+        theta[plant.n_linear :] = of_terms
         solved = descend(problem, theta, fixed=~linear, max_steps=2)
         tried.append((solved.squares, solved.theta, solved.local))
     tried.sort(key=lambda trial: trial[0])
