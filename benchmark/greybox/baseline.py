@@ -30,6 +30,7 @@ class Baseline:
     valid: Records
     outputs: tuple[int, ...]  # of the data set
     estimate: Estimate
+    n_init: int  # samples from which a record is simulated
     cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
     outliers: tuple[Outliers, ...] = ()  # found in the readings, and left out of both records
 

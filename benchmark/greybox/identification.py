@@ -70,7 +70,7 @@ def channels_of(identified: Sequence[Identified], data: TrainingSet) -> Channels
 def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
     """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
     rigid = _rigid(data, channels, outputs, settled)
-    joint = with_joint(rigid, channels, data.n_init)
+    joint = with_joint(rigid, channels)
     if joint is None or not is_better(on_joint(joint, rigid.trial.estimate), joint, rigid):
         return rigid
     flexible = select(joint)

@@ -24,7 +24,7 @@ FEWEST_SAMPLES = 50  # of a record that may show how a joint swings
 SIDES: tuple[two_masses.Side, ...] = ("motor", "load")
 
 
-def with_joint(rigid: Selection, channels: Channels, n_init: int) -> Baseline | None:
+def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     """Put a flexible joint into a drive whose position is measured, on either side; None where none is seen to swing.
 
     It must lower the held-out error as a higher order must, by more than a standard error. Where the rigid drive is
@@ -37,7 +37,7 @@ def with_joint(rigid: Selection, channels: Channels, n_init: int) -> Baseline | 
     poles = baseline.estimate.theta[plant.layout.poles]
     best, most = None, 0.0
     for delay in ((), *_delays(chosen)):
-        to_beat = block_errors(chosen if delay else baseline.estimate, baseline.valid, n_init)
+        to_beat = block_errors(chosen if delay else baseline.estimate, baseline.valid, baseline.n_init)
         shapes = list(two_masses.shapes(poles, records.duration, dt))
         for side in SIDES:
             joint = Plant(
@@ -48,7 +48,7 @@ def with_joint(rigid: Selection, channels: Channels, n_init: int) -> Baseline | 
                 joint = replace(joint, scales=plant.scales).having([Term(EFFECTS["input_delay"]())])
             fit = fit_plain(joint, records, shapes=shapes, of_terms=delay)
             shapes = [*shapes[::4], list(fit.theta[joint.layout.poles])]  # both sides have the same poles
-            gain = to_beat - block_errors(fit, baseline.valid, n_init)
+            gain = to_beat - block_errors(fit, baseline.valid, baseline.n_init)
             seen = two_masses.swings(fit.theta[joint.layout.poles], records.duration, dt)
             enough = gain.mean() > max(WORTH_AN_ORDER * to_beat.mean(), gain.std() / math.sqrt(len(gain)))
             if seen and enough and gain.mean() / to_beat.mean() > most:

@@ -61,7 +61,7 @@ def find_baseline(
 
     def baseline_of(plain: Estimate) -> Baseline:
         plain = scaled(plain, records, channels, outputs)
-        return Baseline(records, held_out, tuple(outputs), plain, cut, tuple(outliers))
+        return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
     to_beat = block_errors(baseline.estimate, baseline.valid, n_init).mean()

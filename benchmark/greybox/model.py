@@ -32,6 +32,7 @@ class FittedPlant:
     records: Records
     experiments: tuple[Experiment, ...]
     outliers: tuple[Outliers, ...] = ()
+    usual: UsualStart | None = None
 
     @classmethod
     def fit(cls, start: Estimate, baseline: Baseline, experiments: Sequence[Experiment]) -> FittedPlant:
@@ -42,12 +43,13 @@ class FittedPlant:
         if baseline.outliers:
             records = without_outliers(records, first.errors, baseline.outliers)
         estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local)
-        return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers)
+        usual = usual_start(_forecasting(start.plant), estimate, records, baseline.noise, baseline.n_init)
+        return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers, usual)
 
     def saved_state(self) -> dict[str, Any]:
         """What simulates; the training data and their errors stay behind."""
         return {"plant": self.estimate.plant, "theta": self.estimate.theta, "noise": self.noise,
-                "outputs": self.outputs, "outliers": self.outliers}  # fmt: skip
+                "outputs": self.outputs, "outliers": self.outliers, "usual": self.usual}  # fmt: skip
 
     @classmethod
     def from_saved(cls, state: dict[str, Any]) -> FittedPlant:
@@ -55,15 +57,16 @@ class FittedPlant:
         plant, theta, noise = state["plant"], np.asarray(state["theta"], dtype=np.float64), state["noise"]
         if theta.shape != (len(plant.free),) or len(noise.deviations) != plant.ny or len(state["outputs"]) != plant.ny:
             raise ValueError("the parameters are not those of such a plant")
+        if state["usual"] is not None and len(state["usual"].mean) != plant.order:
+            raise ValueError("the usual start is not that of such a plant")
         nothing = Records.measured(np.empty((0, 0, plant.nu)), np.empty((0, 0, plant.ny)), plant.dt)
         estimate = Estimate(plant, theta, np.empty((0, 0)), nothing.y, np.nan, True)
-        return cls(estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]))
+        return cls(estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]), state["usual"])
 
     @property
     def forecasting(self) -> Plant:
         """The plant without what belongs to single experiments and cannot be forecast."""
-        plant = self.estimate.plant
-        return plant.having([term for term in plant.terms if term not in plant.per_experiment])
+        return _forecasting(self.estimate.plant)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -77,15 +80,7 @@ class FittedPlant:
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         beginning = Records.measured(u[:, :n], y_init, plant.dt)
         found = initial_states(plant, theta, beginning, self.noise)
-        if n not in self._usual:
-            self._usual[n] = usual_start(plant, self.estimate, self.records, self.noise, n)
-        usual = self._usual[n]
-        return usual.beside(Problem(plant, beginning, self.noise), theta, found) if usual else found
-
-    @cached_property
-    def _usual(self) -> dict[int, UsualStart | None]:
-        """The usual start beside so many first samples."""
-        return {}
+        return self.usual.beside(Problem(plant, beginning, self.noise), theta, found) if self.usual else found
 
     def contributions(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -133,7 +128,9 @@ class FittedPlant:
 class GreyBoxModel:
     """A model of a data set: one fitted plant for each of its outputs, or for a position with its velocity."""
 
-    parts: ClassVar = (FittedPlant, Noise, Outliers, Plant, PlantScales, SignalScales, Term)  # records in a saved model
+    parts: ClassVar = (  # records in a saved model
+        FittedPlant, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
+    )  # fmt: skip
     saved_as: ClassVar = "greybox"
 
     plants: list[FittedPlant] = field(default_factory=list, repr=False)
@@ -172,3 +169,7 @@ class GreyBoxModel:
             "order": [plant.order for plant in plants],
             "effects": [[term.effect.name for term in plant.terms] for plant in plants],
         }
+
+
+def _forecasting(plant: Plant) -> Plant:
+    return plant.having([term for term in plant.terms if term not in plant.per_experiment])
