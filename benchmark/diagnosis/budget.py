@@ -23,6 +23,7 @@ from simgap.records import Dataset
 Runs = Sequence[Float[np.ndarray, "N ny"]]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a simulation that grows without bound
 def budgets(
     named: Sequence[Evidence], model: GreyBoxModel, dataset: Dataset, before: Runs, after: Runs, seed: int
 ) -> tuple[Budget, ...]:

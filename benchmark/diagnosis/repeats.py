@@ -11,7 +11,7 @@ from simgap.greybox.samples import sizes_of
 from simgap.records import Experiment
 
 ALIKE = 0.01  # of an input's spread: what the inputs of repeated runs differ by, root mean square
-STARTS = 0.1  # of an output's spread: what their first samples differ by
+STARTS = 0.3  # of an output's spread: what their first samples differ by, noise included
 OVERLAP = 0.5  # of the longer run, that the shorter one lasts at least
 
 

@@ -82,8 +82,9 @@ def learn(model: GreyBoxModel, seed: int) -> Rest:
     """
     y_hat = simulated(model)
     outputs: dict[int, RestOfOutput | None] = {}
-    for plant in model.plants:
-        outputs |= zip(plant.outputs, _learn_plant(plant, y_hat, seed), strict=True)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that grows without bound
+        for plant in model.plants:
+            outputs |= zip(plant.outputs, _learn_plant(plant, y_hat, seed), strict=True)
     return Rest(tuple(outputs[i] for i in sorted(outputs)))
 
 
@@ -114,7 +115,8 @@ def _learn_plant(plant: FittedPlant, y_hat: np.ndarray, seed: int) -> list[RestO
         before, after = best.before[:, j], best.after[:, j]
         rounding = float(records.resolution[j]) ** 2 * len(e[rows])
         largest = float(np.abs(e[..., j][mask]).max())
-        rest = RestOfOutput(features, best.means, best.coefficients[:, j], largest, 1 - after.sum() / before.sum())
+        share = float(1 - (after.sum() + rounding) / (before.sum() + rounding))
+        rest = RestOfOutput(features, best.means, best.coefficients[:, j], largest, share)
         rests.append(rest if helps(before, after, rounding) else None)
     return rests
 
