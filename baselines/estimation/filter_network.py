@@ -26,6 +26,7 @@ class FilterNetwork:
     sizes: Float[np.ndarray, " s"]
     weights: tuple[np.ndarray, ...]  # A [curves, s, taps], a, B [1, curves, taps], L [1, s, taps], c
     size: float  # of the error
+    largest: float  # error in training; no prediction is larger
     share: float
 
     def predict(self, u: Float[np.ndarray, "B T nu"], y_hat: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T"]:
@@ -35,7 +36,7 @@ class FilterNetwork:
         z = (np.concatenate((u, y_hat), axis=2) - self.means) / self.sizes
         with torch.no_grad():
             e = _pass(torch.tensor(np.moveaxis(z, 2, 1).copy()), [torch.tensor(w) for w in self.weights])
-        return self.size * e[:, 0].numpy()
+        return np.clip(self.size * e[:, 0].numpy(), -self.largest, self.largest)
 
     @property
     def n_params(self) -> int:
@@ -79,7 +80,8 @@ def train(
             break
     _, errors, known = parts[1]
     share = 1 - best / float(torch.sum(known * errors**2) / known.sum())
-    return FilterNetwork(means, sizes, tuple(w.double().numpy() for w in kept), size, share)
+    largest = float(np.abs(e[mask]).max())
+    return FilterNetwork(means, sizes, tuple(w.double().numpy() for w in kept), size, largest, share)
 
 
 def _rounds(weights: list, loss) -> Iterator[None]:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from simgap.diagnosis import promises
 from simgap.diagnosis.gains import SMALLEST_ERROR, free_run
+from simgap.diagnosis.promises import Promise
 from simgap.diagnosis.repeats import variance_of_repeats
 from simgap.findings import Budget
 from simgap.greybox.evidence import Evidence
@@ -25,7 +26,7 @@ Runs = Sequence[Float[np.ndarray, "N ny"]]
 
 @np.errstate(over="ignore", invalid="ignore")  # of a simulation that grows without bound
 def budgets(
-    named: Sequence[Evidence], model: GreyBoxModel, dataset: Dataset, before: Runs, after: Runs, seed: int
+    promised: Promise | None, plain: GreyBoxModel, dataset: Dataset, before: Runs, seed: int
 ) -> tuple[Budget, ...]:
     """Divide the mean squared error of the plain model among causes, what is learnable, the floor and the unexplained.
 
@@ -33,32 +34,41 @@ def budgets(
         learnable = (mse with all causes - mse with all and the learnt rest) / mse of the plain model, 0 at least
 
     The floor is the variance between repeated runs, where there are any, and no more than what is left; the
-    unexplained is the rest, so that all shares of an output sum to 1. `named` is the evidence with the causes alone,
-    `model` has them, or is the plain one; `before` and `after` simulate the test experiments without and with them.
+    unexplained is the rest, so that all shares of an output sum to 1. `before` is the plain model's simulation of the
+    test experiments; where nothing is promised, or no cause named, the learnable is that of its error.
     """
+    named = promised if promised and promised.causes else None
+    model, after = (named.model, named.after) if named else (plain, before)
     n, rest = dataset.n_init, learn(model, seed)
-    plain, last = _mse(dataset, before), _mse(dataset, after)
     learnt = [
         y_hat + rest.predict(x.u[None], model.simulate_whole(x.u[None], x.y[None, :n]))[0, n:]
         for x, y_hat in zip(dataset.test, after, strict=True)
     ]
-    with_rest = np.minimum(_mse(dataset, learnt), last)
+    of_plain, of_named = _mse(dataset, before), _mse(dataset, after)
+    learnable = np.maximum(of_named - _mse(dataset, learnt), 0.0) / of_plain
     floor = _floor(model, dataset, after)
-    shares: dict[int, dict[str, float]] = {}
-    for plant in named:
-        shares |= _causes(plant, plain, dataset)
+    causes: dict[int, dict[str, float]] = {}
+    for plant in named.named if named else ():
+        causes |= _causes(plant, of_plain, dataset)
     rounding = (SMALLEST_ERROR * sizes_of(np.concatenate([x.y for x in dataset.test]))) ** 2
-    answer = []
-    for j, channel in enumerate(dataset.channels.outputs):
-        causes = shares.get(j, {})
-        if not rounding[j] < plain[j] < math.inf or not all(map(math.isfinite, causes.values())):
-            answer.append(Budget(channel.name, dict.fromkeys(causes, math.nan), math.nan, None, math.nan))
-            continue
-        left = float(with_rest[j] / plain[j])
-        repeats = None if floor is None else min(float(floor[j] / plain[j]), left)
-        learnable = float((last[j] - with_rest[j]) / plain[j])
-        answer.append(Budget(channel.name, causes, learnable, repeats, left - (repeats or 0.0)))
-    return tuple(answer)
+    return tuple(
+        _divided(
+            channel.name, causes.get(j, {}), float(learnable[j]), None if floor is None else floor[j] / of_plain[j]
+        )
+        if rounding[j] < of_plain[j] < math.inf
+        else _divided(channel.name, causes.get(j, {}), math.nan, None)
+        for j, channel in enumerate(dataset.channels.outputs)
+    )
+
+
+def _divided(output: str, causes: dict[str, float], learnable: float, floor: float | None) -> Budget:
+    """Leave to the floor what is left at most, and the rest unexplained; no share is known where one is not."""
+    left = 1.0 - sum(causes.values()) - learnable
+    if not math.isfinite(left):
+        return Budget(output, dict.fromkeys(causes, math.nan), math.nan, None, math.nan)
+    if floor is not None:
+        floor = min(float(floor), left)
+    return Budget(output, causes, learnable, floor, left - (floor or 0.0))
 
 
 def _causes(plant: Evidence, plain: np.ndarray, dataset: Dataset) -> dict[int, dict[str, float]]:

@@ -13,7 +13,7 @@ from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.budget import budgets
 from simgap.error_views.views import views
-from simgap.findings import Budget, Findings, Offer, Trace, Verdict, Wrong
+from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import Identified, channels_of, identify
@@ -95,7 +95,7 @@ def diagnose(
         traces=_traces(dataset, before, promised.after if promised else before),
         seed=seed,
         suspects=promised.suspects if promised else (),
-        budget=_budget(promised, plain, dataset, before, seed) if views_too else (),
+        budget=budgets(promised, plain, dataset, before, seed) if views_too else (),
     )
     model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     return Diagnosis(findings, time.perf_counter() - begin, model)
@@ -108,15 +108,6 @@ def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
     said += [doubts.beaten_by_mean(plant.selection, dataset.channels) for plant in evidence]
     said += [doubts.beaten_by_order(plant.identified, dataset.channels) for plant in evidence]
     return tuple(sentence for sentence in said if sentence)
-
-
-def _budget(
-    promised: promises.Promise | None, plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray], seed: int
-) -> tuple[Budget, ...]:
-    """Divide the plain model's error: among the causes and what they leave or, without any, of all of it."""
-    if promised and promised.causes:
-        return budgets(promised.named, promised.model, dataset, before, promised.after, seed)
-    return budgets((), plain, dataset, before, before, seed)
 
 
 def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -28,6 +29,21 @@ CERTAIN = 2.5
 MATTERS = 0.01
 
 
+@runtime_checkable
+class Predictor(Protocol):
+    """What predicts the error of one output; share is the part of held-out squared errors that it predicts."""
+
+    @property
+    def share(self) -> float: ...
+
+    @property
+    def n_params(self) -> int: ...
+
+    def predict(
+        self, u: Float[np.ndarray, "B T nu"], y_hat: Float[np.ndarray, "B T ny"]
+    ) -> Float[np.ndarray, "B T"]: ...
+
+
 @dataclass(frozen=True, eq=False)
 class RestOfOutput:
     """e_hat = c (phi - m) of one output, nowhere larger than the largest error in training.
@@ -40,6 +56,11 @@ class RestOfOutput:
     coefficients: Float[np.ndarray, " f"]
     largest: float
     share: float
+
+    @property
+    def n_params(self) -> int:
+        """Numbers that were estimated, not drawn."""
+        return len(self.coefficients)
 
     def predict(self, u: Float[np.ndarray, "B T nu"], y_hat: Float[np.ndarray, "B T ny"]) -> Float[np.ndarray, "B T"]:
         """Predict the error of a simulation y_hat."""
@@ -54,12 +75,12 @@ class RestOfOutput:
 class Rest:
     """The learnt rest of every output of a data set; None where cross-validation shows nothing to learn."""
 
-    outputs: tuple[RestOfOutput | None, ...]
+    outputs: tuple[Predictor | None, ...]
 
     @property
     def n_params(self) -> int:
-        """Numbers that a prediction uses, those that were drawn apart."""
-        return sum(len(rest.coefficients) for rest in self.outputs if rest)
+        """Numbers that were estimated."""
+        return sum(rest.n_params for rest in self.outputs if rest)
 
     def predict(
         self, u: Float[np.ndarray, "B T nu"], y_hat: Float[np.ndarray, "B T ny"]

@@ -23,7 +23,7 @@ def without_names(dataset):
     """The budget of the plain model alone, as if nothing had been found."""
     plain = plain_grey_box(dataset)
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
-    return budgets((), plain, dataset, before, before, 0)
+    return budgets(None, plain, dataset, before, 0)
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def test_the_variance_between_two_runs_is_not_biased():
 def test_a_plain_model_that_diverges_has_no_budget(friction):
     plain = plain_grey_box(friction)
     before = [np.full((len(x) - 20, 1), np.inf) for x in friction.test]
-    (budget,) = budgets((), plain, friction, before, before, 0)
+    (budget,) = budgets(None, plain, friction, before, 0)
     assert math.isnan(budget.unexplained) and budget.floor is None
 
 
