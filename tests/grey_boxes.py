@@ -3,14 +3,13 @@
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import plants_of
-from simgap.records import Dataset
+from simgap.records import TrainingSet
 
 
-def plain_grey_box(dataset: Dataset) -> GreyBoxModel:
+def plain_grey_box(data: TrainingSet) -> GreyBoxModel:
     """The plain linear model of each plant, fitted to all training data."""
-    training, channels = dataset.training, dataset.channels
     plants = []
-    for outputs in plants_of(channels):
-        baseline = find_baseline(training.train, training.valid, channels, outputs, dataset.n_init)
-        plants.append(FittedPlant.fit(baseline.estimate, baseline, training.train + training.valid))
+    for outputs in plants_of(data.channels):
+        baseline = find_baseline(data.train, data.valid, data.channels, outputs, data.n_init)
+        plants.append(FittedPlant.fit(baseline.estimate, baseline, data.train + data.valid))
     return GreyBoxModel(plants)

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.fft import next_fast_len
 
-TAPS = 64  # samples that each filter reaches back
+TAPS = 96  # samples that each filter reaches back
 CURVES = 12
-ROUNDS, STEPS = 40, 20  # of L-BFGS; the held-out error is asked for after each round
-PATIENCE = 4  # rounds without a better one
+ROUNDS, STEPS = 80, 20  # of L-BFGS; the held-out error is asked for after each round
+PATIENCE = 8  # rounds without a better one
+HISTORY = 60  # steps that L-BFGS remembers
+DECAY = 10.0  # samples: of the impulse responses that are drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,7 @@ def train(
 def _rounds(weights: list, loss) -> Iterator[None]:
     import torch
 
-    optimizer = torch.optim.LBFGS(weights, max_iter=STEPS, history_size=STEPS, line_search_fn="strong_wolfe")
+    optimizer = torch.optim.LBFGS(weights, max_iter=STEPS, history_size=HISTORY, line_search_fn="strong_wolfe")
 
     def closure() -> torch.Tensor:
         optimizer.zero_grad()
@@ -102,20 +105,26 @@ def _rounds(weights: list, loss) -> Iterator[None]:
 
 def _drawn(signals: int, seed: int) -> list[np.ndarray]:
     """Draw impulse responses that decay."""
-    rng, decay = np.random.default_rng(seed), np.exp(-np.arange(TAPS)[::-1] / (TAPS / 6))
+    rng, decay = np.random.default_rng(seed), np.exp(-np.arange(TAPS)[::-1] / DECAY)
     a, b, linear = (
-        size * decay * rng.uniform(-1, 1, (*shape, TAPS)) / np.sqrt(shape[1] * TAPS)
-        for size, shape in ((3.0, (CURVES, signals)), (0.1, (1, CURVES)), (0.1, (1, signals)))
+        size * decay * rng.uniform(-1, 1, (*shape, TAPS)) / np.sqrt(shape[1] * DECAY)
+        for size, shape in ((1.0, (CURVES, signals)), (0.03, (1, CURVES)), (0.03, (1, signals)))
     )
-    return [a, rng.uniform(-1, 1, CURVES) / np.sqrt(signals * TAPS), b, linear, np.zeros(1)]
+    return [a, rng.uniform(-1, 1, CURVES) / np.sqrt(signals * DECAY), b, linear, np.zeros(1)]
 
 
 def _pass(z, weights):
-    from torch.nn import functional
-
+    """Compute B(q) tanh(A(q) z + a) + L(q) z + c of signals z [E, s, T]."""
     a, offsets, b, linear, offset = weights
+    return _filtered(_filtered(z, a).add(offsets[:, None]).tanh(), b) + _filtered(z, linear) + offset
 
-    def filtered(x, taps, bias):
-        return functional.conv1d(functional.pad(x, (taps.shape[2] - 1, 0), mode="replicate"), taps, bias)
 
-    return filtered(filtered(z, a, offsets).tanh(), b, offset) + filtered(z, linear, None)
+def _filtered(x, taps):
+    """Sum the signals x [E, s, T] through the impulse responses taps [o, s, taps], last sample first, by FFT."""
+    import torch
+    from torch.nn.functional import pad
+
+    before = taps.shape[2] - 1
+    n = next_fast_len(x.shape[2] + before, real=True)
+    spectra = torch.fft.rfft(pad(x, (before, 0), mode="replicate"), n), torch.fft.rfft(taps, n).conj()
+    return torch.fft.irfft(torch.einsum("esf,osf->eof", *spectra), n)[:, :, : x.shape[2]]

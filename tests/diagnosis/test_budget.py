@@ -21,7 +21,7 @@ def total(budget):
 
 def without_names(dataset):
     """The budget of the plain model alone, as if nothing had been found."""
-    plain = plain_grey_box(dataset)
+    plain = plain_grey_box(dataset.training)
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     return budgets(None, plain, dataset, before, 0)
 
@@ -95,7 +95,7 @@ def test_the_floor_is_the_noise_that_repeated_runs_differ_by(repeats):
     dataset, variance = repeats
     (budget,) = without_names(dataset)
     # What a start from a few noisy samples adds is part of it.
-    assert budget.floor * mse(plain_grey_box(dataset), dataset) == pytest.approx(variance, rel=0.1)
+    assert budget.floor * mse(plain_grey_box(dataset.training), dataset) == pytest.approx(variance, rel=0.1)
     assert total(budget) == pytest.approx(1.0)
     assert budget.unexplained >= 0
 
@@ -104,7 +104,7 @@ def test_without_repeated_test_experiments_those_in_training_tell_the_floor(repe
     dataset, variance = repeats
     training = replace(dataset.training, train=dataset.training.train + dataset.test[:7])
     (budget,) = without_names(moved := replace(dataset, training=training, test=dataset.test[7:]))
-    assert budget.floor * mse(plain_grey_box(moved), moved) == pytest.approx(variance, rel=0.1)
+    assert budget.floor * mse(plain_grey_box(moved.training), moved) == pytest.approx(variance, rel=0.1)
 
 
 def test_a_copy_is_no_repeated_run_nor_is_one_from_elsewhere_or_with_another_input(repeats):
@@ -124,7 +124,7 @@ def test_the_variance_between_two_runs_is_not_biased():
 
 
 def test_a_plain_model_that_diverges_has_no_budget(friction):
-    plain = plain_grey_box(friction)
+    plain = plain_grey_box(friction.training)
     before = [np.full((len(x) - 20, 1), np.inf) for x in friction.test]
     (budget,) = budgets(None, plain, friction, before, 0)
     assert math.isnan(budget.unexplained) and budget.floor is None

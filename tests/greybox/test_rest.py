@@ -25,7 +25,7 @@ def predicted(model, rest, dataset):
 
 @pytest.fixture(scope="module")
 def clean():
-    return plain_grey_box(hide("cart", {}, noise=0.05, seed=1))
+    return plain_grey_box(hide("cart", {}, noise=0.05, seed=1).training)
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.9, 0.98])
@@ -43,20 +43,20 @@ def test_of_noise_nothing_is_learnt(clean, colour):
 )
 def test_most_of_a_cause_that_the_model_lacks_is_learnt(rig, effect):
     dataset = hide(rig, {effect: 1.0}, noise=0.05, seed=2)
-    model = plain_grey_box(dataset)
+    model = plain_grey_box(dataset.training)
     rest = learn(model, 0)
     assert rest.outputs[0].share > 0.4
     assert predicted(model, rest, dataset) > 0.4
 
 
 def test_what_no_input_shows_is_not_learnt():
-    model = plain_grey_box(hide("stage", {"missing_input": 1.0}, noise=0.05, seed=3))
+    model = plain_grey_box(hide("stage", {"missing_input": 1.0}, noise=0.05, seed=3).training)
     assert learn(model, 0).outputs == (None,)
 
 
 def test_a_prediction_is_never_larger_than_the_largest_error_in_training():
     dataset = hide("cart", {"dead_zone": 1.0}, noise=0.05, seed=4)
-    model = plain_grey_box(dataset)
+    model = plain_grey_box(dataset.training)
     far = 1e6 * dataset.test[0].u[None]
     y_hat = model.simulate_whole(far, dataset.test[0].y[None, :20])
     largest = np.abs(model.plants[0].estimate.errors).max()
@@ -65,7 +65,7 @@ def test_a_prediction_is_never_larger_than_the_largest_error_in_training():
 
 def test_the_unit_of_the_output_changes_nothing():
     dataset = hide("cart", {"dead_zone": 1.0}, noise=0.05, seed=4)
-    model = plain_grey_box(dataset)
+    model = plain_grey_box(dataset.training)
     (plant,) = model.plants
     share = learn(model, 0).outputs[0].share
     errors = replace(plant, estimate=replace(plant.estimate, errors=1e-2 * plant.estimate.errors))
