@@ -21,7 +21,7 @@ from simgap.greybox.samples import sizes_of
 from simgap.metrics import is_finite
 from simgap.records import Dataset
 
-Runs = Sequence[Float[np.ndarray, "N ny"]]
+Runs = Sequence[np.ndarray]  # [N, ny] of each experiment
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a simulation that grows without bound

@@ -16,7 +16,7 @@ OVERLAP = 0.5  # of the longer run, that the shorter one lasts at least
 
 
 def variance_of_repeats(
-    experiments: Sequence[Experiment], errors: Sequence[Float[np.ndarray, "N ny"]], n_init: int
+    experiments: Sequence[Experiment], errors: Sequence[np.ndarray], n_init: int
 ) -> Float[np.ndarray, " ny"] | None:
     """Compute the variance between runs with the same input, around their mean; None without any.
 
