@@ -59,7 +59,7 @@ def train(
     import torch
 
     z = np.concatenate((u, y_hat), axis=2)
-    means, sizes, size = z[mask].mean(axis=0), z[mask].std(axis=0), float(np.std(e[mask]))
+    means, sizes, size = z[mask].mean(axis=0), z[mask].std(axis=0), float(np.std(e[mask])) or 1.0
     sizes = np.where(sizes > 0, sizes, 1.0)
     z = np.moveaxis((z - means) / sizes, 2, 1)
     parts = []
