@@ -67,9 +67,21 @@ class FittedPlant:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate rows n .. T-1, from the initial state that suits the n measured samples best."""
+        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
+
+    def simulate_whole(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T ny"]:
+        """Simulate all rows from that initial state, those of the measured samples too."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         start = initial_states(plant, theta, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
-        return Simulator(plant, u).run(theta, start)[:, n:]
+        return Simulator(plant, u).run(theta, start)
+
+    def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
+        """Simulate the training records from the initial states that suit all of each best."""
+        plant, estimate = self.forecasting, self.estimate
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        return Simulator(plant, self.records.u).run(theta, local)
 
     def contributions(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -126,10 +138,16 @@ class GreyBoxModel:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate from the state found in the n measured samples; what belongs to one experiment is not forecast."""
-        y_hat = np.empty((len(u), u.shape[1] - y_init.shape[1], y_init.shape[2]))
+        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
+
+    def simulate_whole(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T ny"]:
+        """Simulate all rows from that state, those of the measured samples too."""
+        y_hat = np.empty((*u.shape[:2], y_init.shape[2]))
         for plant in self.plants:
             outputs = list(plant.outputs)
-            y_hat[:, :, outputs] = plant.simulate(u, y_init[:, :, outputs])
+            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs])
         return y_hat
 
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
