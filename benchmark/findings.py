@@ -158,6 +158,22 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Budget:
+    """Where the plain model's mean squared error of one output on the test split goes, in shares that sum to 1.
+
+    causes: what each takes on top of those before it, by name (name:channel where an effect sits on several channels),
+    negative where it makes the error larger; learnable: what inputs and simulation predict of what the causes leave;
+    floor: what repeated runs differ by, None without repeated runs. NaN where the plain model diverges or errs not.
+    """
+
+    output: str
+    causes: dict[str, float]
+    learnable: float
+    floor: float | None
+    unexplained: float
+
+
+@dataclass(frozen=True)
 class Offer:
     """A formula for the missing force from a sparse regression: an offer to look at, not a finding."""
 
@@ -191,6 +207,7 @@ class Findings:
     seed: int = 0
     linear: dict[str, Any] | None = None  # as baseline: the linear model of any order, where it does as well as effects
     suspects: tuple[Cause, ...] = ()  # in the place of causes, or beside them
+    budget: tuple[Budget, ...] = ()  # of each output
 
     @property
     def effects(self) -> tuple[Cause, ...]:
@@ -213,6 +230,7 @@ class Findings:
             "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
             "gain": vars(self.gain),
+            "budget": {b.output: {k: v for k, v in vars(b).items() if k != "output"} for b in self.budget},
             "kinds": {name: {"kind": kind, "from": self.kinds_from.get(name)} for name, kind in self.kinds.items()},
             "doubts": list(self.doubts),
             "checks": list(self.checks),

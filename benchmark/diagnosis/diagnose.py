@@ -11,6 +11,7 @@ import numpy as np
 
 from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
+from simgap.diagnosis.budget import budgets
 from simgap.error_views.views import views
 from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
@@ -41,10 +42,10 @@ def diagnose(
 ) -> Diagnosis:
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
-    `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the
-    views. With `profiles` the likelihood profile of every parameter is computed too, as the page shows it; without
-    `views_too` the views of the error are left out. `kind` says what the outputs are, as in `simgap.load`.
-    Raises UnusableInput.
+    `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the views and the
+    features of the learnable rest. With `profiles` the likelihood profile of every parameter is computed too, as the
+    page shows it; without `views_too` the views of the error and its budget are left out. `kind` says what the outputs
+    are, as in `simgap.load`. Raises UnusableInput.
     """
     from simgap.data import load
     from simgap.data.kinds import with_kinds
@@ -94,6 +95,7 @@ def diagnose(
         traces=_traces(dataset, before, promised.after if promised else before),
         seed=seed,
         suspects=promised.suspects if promised else (),
+        budget=budgets(promised, plain, dataset, before, seed) if views_too else (),
     )
     model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     return Diagnosis(findings, time.perf_counter() - begin, model)

@@ -25,6 +25,7 @@ class Promise:
 
     causes: tuple[Cause, ...]
     suspects: tuple[Cause, ...]
+    named: tuple[Evidence, ...]  # of each plant, with the causes alone
     model: GreyBoxModel
     after: tuple[np.ndarray, ...]  # its simulation of the test experiments
     gain: Gain
@@ -46,7 +47,7 @@ def trusted(shares: Sequence[float]) -> int:
 def rests_on(plant: Evidence) -> Evidence | None:
     """Return the evidence with those effects only that the search rests on; None where it rests on none it found."""
     count = trusted(plant.shares)
-    return _only(plant, plant.terms[:count]) if count or not plant.terms else None
+    return only(plant, plant.terms[:count]) if count or not plant.terms else None
 
 
 def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.ndarray], profiles: bool) -> Promise:
@@ -59,17 +60,17 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
     least = 0 if any(plant.selection.baseline.outliers for plant in evidence) else 1
     found = _causes(evidence, profiles)
     for count in range(len(listed), least - 1, -1):
-        kept = [_only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
+        kept = [only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
         model = GreyBoxModel([plant.identified.plant for plant in kept])
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
         gain = gains.measure(dataset, before, after)
         if count == len(listed):
-            suspected = Promise((), found, model, after, gain)
+            suspected = Promise((), found, (), model, after, gain)
         if gain.low > 0:
             causes = found if count == len(listed) else _causes(kept, profiles)
             named = {(cause.effect, cause.channel) for cause in causes}
             rest = tuple(cause for cause in found if (cause.effect, cause.channel) not in named)
-            return Promise(causes, rest, model, after, gain)
+            return Promise(causes, rest, tuple(kept), model, after, gain)
     return suspected
 
 
@@ -86,7 +87,7 @@ def _causes(evidence: Sequence[Evidence], profiles: bool) -> tuple[Cause, ...]:
     )
 
 
-def _only(plant: Evidence, terms: Sequence[Term]) -> Evidence:
+def only(plant: Evidence, terms: Sequence[Term]) -> Evidence:
     """Return the evidence about the same plant with some of its effects only, fitted to all training data again."""
     selection = plant.selection
     if len(terms) == len(selection.trial.terms):

@@ -65,6 +65,12 @@ class Evidence:
         return [term for term, _ in self._in_order]
 
     @property
+    def names(self) -> list[tuple[str, str]]:
+        """The effect and the channel of each cause, bad readings first."""
+        of_outliers = [Term(OutlierEffect(), outliers.output) for outliers in self.selection.baseline.outliers]
+        return [(term.effect.name, self._channel(term)) for term in (*of_outliers, *self.terms)]
+
+    @property
     def shares(self) -> list[float]:
         """Share of the plain model's squared error in training that each takes, on top of those before it."""
         return [share for _, share in self._in_order]

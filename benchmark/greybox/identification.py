@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class Identified:
     settled: Settled | None = None  # what its output is, where nobody had said it
     linear: Baseline | None = None  # the linear model that does as well
 
-    @property
+    @cached_property
     def plain(self) -> FittedPlant:
         """The plain linear plant that gains are counted from."""
         baseline = self.selection.baseline

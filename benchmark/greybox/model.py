@@ -72,8 +72,19 @@ class FittedPlant:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate rows n .. T-1, from the initial state that suits the n measured samples best."""
-        start = self._start(u, y_init)
-        return Simulator(self.forecasting, u).run(self.estimate.theta, start)[:, y_init.shape[1] :]
+        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
+
+    def simulate_whole(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T ny"]:
+        """Simulate all rows from that initial state, those of the measured samples too."""
+        return Simulator(self.forecasting, u).run(self.estimate.theta, self._start(u, y_init))
+
+    def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
+        """Simulate the training records from the initial states that suit all of each best."""
+        plant, estimate = self.forecasting, self.estimate
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        return Simulator(plant, self.records.u).run(theta, local)
 
     def _start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
         """Find the initial states: from the first n samples, and from where the training records start."""
@@ -139,10 +150,16 @@ class GreyBoxModel:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Simulate from the state found in the n measured samples; what belongs to one experiment is not forecast."""
-        y_hat = np.empty((len(u), u.shape[1] - y_init.shape[1], y_init.shape[2]))
+        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
+
+    def simulate_whole(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T ny"]:
+        """Simulate all rows from that state, those of the measured samples too."""
+        y_hat = np.empty((*u.shape[:2], y_init.shape[2]))
         for plant in self.plants:
             outputs = list(plant.outputs)
-            y_hat[:, :, outputs] = plant.simulate(u, y_init[:, :, outputs])
+            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs])
         return y_hat
 
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:

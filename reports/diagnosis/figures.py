@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simgap.findings import Findings, Profile, Trace, Value, Wrong
+from simgap.findings import Budget, Findings, Profile, Trace, Value, Wrong
+from simgap.reports.diagnosis import numbers
 from simgap.reports.diagnosis.traces import axis_range, thin
-from simgap.reports.diagnosis.words import LAST, shorten
+from simgap.reports.diagnosis.words import LAST, parts_of, shorten
 from simgap.reports.rendering import printable
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 MEASURED, BEFORE, AFTER, INPUT, ERROR = "#8b919a", "#e0662b", "#1f83c6", "#5f9e6e", "#8f6fbf"
+CAUSES = (AFTER, "#6bb1e0", "#155a8a", "#a5d0ee", "#0f3f61")  # of an error budget
 GRID = "rgba(128, 136, 148, 0.22)"
 POINTS = 2000  # of one curve
 ALL_POINTS = 36_000  # of all curves of a page
@@ -99,6 +101,35 @@ def view_figure(view: Wrong, unit: str) -> go.Figure | None:
     figure.update_yaxes(zeroline=True, zerolinecolor="rgba(128, 136, 148, 0.8)", rangemode="tozero")
     _heading(figure, 1, f"{'RMS' if size else 'mean'} error of {label(view.output, unit)}")
     return _styled(figure, 270, 26, 48)
+
+
+def budget_figure(findings: Findings) -> go.Figure | None:
+    """Draw a bar per output: shares of the plain model's squared error, side by side; negative ones left of zero."""
+    import plotly.graph_objects as go
+
+    figure = go.Figure()
+    outputs = [budget.output for budget in findings.budget if parts_of(budget, findings)]
+    for budget in findings.budget:
+        for i, (part, share) in enumerate(parts_of(budget, findings)):
+            if share:
+                figure.add_trace(
+                    go.Bar(
+                        x=[100 * share], y=[label(budget.output)], orientation="h", width=0.6, name=label(part),
+                        marker={"color": colour_of(budget, i)}, hovertemplate=f"{label(part)}: {numbers.share(share)}",
+                    )
+                )  # fmt: skip
+    if not outputs:
+        return None
+    figure.update_layout(barmode="relative")
+    figure.update_xaxes(title_text="share of the plain model's squared error [%]")
+    figure.update_yaxes(autorange="reversed", automargin=True, showticklabels=len(outputs) > 1)
+    return _styled(figure, 60 + 46 * len(outputs), 10, 48)
+
+
+def colour_of(budget: Budget, part: int) -> str:
+    """Return the colour of one part of a budget: shades of blue for causes, then learnable, floor and unexplained."""
+    causes = len(budget.causes)
+    return CAUSES[part % len(CAUSES)] if part < causes else (ERROR, MEASURED, BEFORE)[part - causes]
 
 
 def profile_figure(profile: Profile, estimate: Value | None) -> go.Figure | None:

@@ -52,6 +52,11 @@ def change(before: float, after: float) -> str:
     return f"{100 * (after / before - 1):+.0f} %".replace("+0 %", "0 %").replace("-0 %", "0 %")
 
 
+def share(value: float) -> str:
+    """Write one of several shares that add up: 0.6134 -> "61.3 %"."""
+    return f"{round(100 * value, 1) + 0.0:.1f} %"  # + 0.0: no minus before a zero
+
+
 def part(value: float, other: float) -> str:
     """Compute how long a bar for `value` is beside one for `other`, the longer being 1."""
     if not math.isfinite(value):

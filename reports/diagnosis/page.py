@@ -55,6 +55,8 @@ def diagnosis_page(findings: Findings) -> str:
         "numbers": numbers,
         "wording": wording,
         "words": words,
+        "colour_of": figures.colour_of,
+        "budget": plots.draw(figures.budget_figure(findings)),
         "traces": _traces(findings, plots),
         "causes": [
             _cause(cause, findings, plots, shown) | {"called": f"{called} {i} of {len(causes)}"}

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from simgap.findings import Cause, Findings
+from simgap.findings import Budget, Cause, Findings
 from simgap.reports.diagnosis import numbers, words
 from simgap.reports.rendering import printable
 from simgap.wording import amount, percent
@@ -34,6 +34,9 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
     if findings.effects:
         title = "Free-run RMSE on the test experiments" + (", with the suspects" if not findings.causes else "")
         paragraphs += _section(title, _gain(findings), width)
+    for budget in findings.budget:
+        title = f"Where the squared error of {budget.output} goes: shares of the plain model's on the test experiments"
+        paragraphs += _section(title, _budget(budget, findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
         share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
@@ -79,6 +82,11 @@ def _cause(cause: Cause, findings: Findings) -> Iterator[str]:
         yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."
     if decide := words.deciding(cause, findings):
         yield decide
+
+
+def _budget(budget: Budget, findings: Findings) -> list[str]:
+    rows = [(numbers.share(share), part) for part, share in words.parts_of(budget, findings) if share is not None]
+    return [f"{share:>8}  {part}" for share, part in rows]
 
 
 def _gain(findings: Findings) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from simgap.findings import Cause, Findings, Wrong
+from simgap.findings import Budget, Cause, Findings, Wrong
 from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
@@ -98,6 +98,21 @@ def runner_up(findings: Findings) -> str:
     if gain is not None:
         told += f"; by itself it would make the held-out squared error {percent(gain)} smaller"
     return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
+
+
+def parts_of(budget: Budget, findings: Findings) -> list[tuple[str, float | None]]:
+    """List the parts of an error budget with their shares: the causes, then what is left; empty where there is none."""
+    if not math.isfinite(budget.unexplained):
+        return []
+    titles = {cause.effect: cause_title(cause, findings) for cause in findings.causes}
+    titles |= {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in findings.causes}
+    return [
+        *((titles.get(name, name), share) for name, share in budget.causes.items()),
+        ("learnable from the input, without a name", budget.learnable),
+        ("floor: what repeated runs differ by", budget.floor),
+        ("unexplained" if budget.floor is not None else "unexplained, or noise: there are no repeated runs",
+         budget.unexplained),
+    ]  # fmt: skip
 
 
 def beyond_chance(findings: Findings) -> list[Wrong]:

@@ -34,8 +34,8 @@ def promised(two_effects, identified, monkeypatch):
             gain = real(dataset, before, after)
             return replace(gain, low=0.1 if len(tried.pop()) <= confirmed else -0.1)
 
-        real, tried, only = gains.measure, [], promises._only
-        monkeypatch.setattr(promises, "_only", lambda plant, terms: (tried.append(terms), only(plant, terms))[1])
+        real, tried, only = gains.measure, [], promises.only
+        monkeypatch.setattr(promises, "only", lambda plant, terms: (tried.append(terms), only(plant, terms))[1])
         monkeypatch.setattr(promises.gains, "measure", measure)
         plain = GreyBoxModel([one.plain for one in identified])
         before = [gains.free_run(plain, x, two_effects.n_init) for x in two_effects.test]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simgap.findings import Cause, Findings, Gain, Offer, Profile, Separation, Trace, Value, Wrong
+from simgap.findings import Budget, Cause, Findings, Gain, Offer, Profile, Separation, Trace, Value, Wrong
 
 HOSTILE = (
     "</script><script>alert(1)</script><img src=x onerror=alert(2)><a href='http://e.example'>\x1b[2J\u202e&lt;{{7*7}}"
@@ -49,6 +49,7 @@ def named() -> Findings:
         kinds={"x": "position"},
         checks=("Only 150 training samples: weak effects cannot be told from noise.",),
         traces=tuple(traces),
+        budget=(Budget("x", {"coulomb_friction": 0.617}, 0.13, 0.1, 0.153),),
     )  # fmt: skip
 
 
@@ -57,7 +58,8 @@ def nothing_found(named) -> Findings:
     """The same cart, and the plain model suffices."""
     same = replace(named.gain, after=named.gain.before, share=0.0, low=0.0, high=0.0)
     traces = tuple(replace(trace, after=trace.before) for trace in named.traces)
-    return replace(named, verdict="nothing_found", causes=(), runner_up=None, gain=same, traces=traces)
+    budget = (Budget("x", {}, 0.0, None, 1.0),)
+    return replace(named, verdict="nothing_found", causes=(), runner_up=None, gain=same, traces=traces, budget=budget)
 
 
 @pytest.fixture
@@ -66,7 +68,9 @@ def suspected(named) -> Findings:
     decide = "record more and longer test experiments, with inputs that bring out an error which depends on the speed"
     suspects = (replace(named.causes[0], confounded_with=(), deciding_experiment=decide),)
     gain = replace(named.gain, after={"x": 1.1}, share=0.113, low=-0.05, high=0.27)
-    return replace(named, verdict="suspected", causes=(), suspects=suspects, gain=gain)
+    return replace(
+        named, verdict="suspected", causes=(), suspects=suspects, gain=gain, budget=(Budget("x", {}, 0.3, 0.1, 0.6),)
+    )
 
 
 @pytest.fixture
@@ -103,4 +107,5 @@ def hostile(unexplained, named) -> Findings:
         checks=(x,),
         offers=(Offer(x, x, 0.1, x),),
         traces=tuple(replace(trace, experiment=x) for trace in named.traces),
+        budget=(Budget(x, {x: 0.5}, 0.2, 0.1, 0.2),),
     )
