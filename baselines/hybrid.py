@@ -9,8 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation import filter_network
+from simgap.baselines.estimation.filter_network import FilterNetwork
 from simgap.baselines.greybox_auto import GreyBoxAuto
-from simgap.greybox.rest import MATTERS, Rest, learn, simulated
+from simgap.greybox.rest import MATTERS, Rest, RestOfOutput, learn, simulated
+from simgap.greybox.rest_features import Design, Features
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
 
@@ -29,6 +31,7 @@ class Hybrid:
     """
 
     stochastic: ClassVar[bool] = True
+    parts: ClassVar = (Design, Features, FilterNetwork, Rest, RestOfOutput)  # records in a saved model
 
     grey: GreyBoxAuto = field(init=False, repr=False)
     rest: Rest = field(init=False, repr=False)

@@ -137,7 +137,7 @@ def _learn_plant(plant: FittedPlant, y_hat: np.ndarray, seed: int) -> list[RestO
         rounding = float(records.resolution[j]) ** 2 * len(e[rows])
         largest = float(np.abs(e[..., j][mask]).max())
         share = float(1 - (after.sum() + rounding) / (before.sum() + rounding))
-        rest = RestOfOutput(features, best.means, best.coefficients[:, j], largest, share)
+        rest = RestOfOutput(features, best.means, best.coefficients[:, j].copy(), largest, share)
         rests.append(rest if helps(before, after, rounding) else None)
     return rests
 
