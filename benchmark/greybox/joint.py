@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,32 +22,30 @@ from simgap.records import Channels
 from simgap.registry import EFFECTS
 
 FEWEST_SAMPLES = 50  # of a record that may show how a joint swings
+SHARES = (0.4, 0.8)
 SIDES: tuple[two_masses.Side, ...] = ("motor", "load")
 
 
 def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     """Put a flexible joint into a drive whose position is measured, on either side; None where none is seen to swing.
 
-    It must lower the held-out error as a higher order must, by more than a standard error. Where the rigid drive is
-    late, one that is late too is tried as well, because a delay hides how a joint swings.
+    It must lower the held-out error as a higher order must, by more than a standard error: that of the plain drive, or
+    with the effects of the rigid drive beside it, which may hide how a joint swings.
     """
     baseline, chosen = rigid.baseline, rigid.trial.estimate
     plant, records, dt = baseline.plant, baseline.train, baseline.plant.dt
     if plant.kind != "position" or plant.order != 2 or plant.joint or len(records.u[0]) < FEWEST_SAMPLES:
         return None
-    poles = baseline.estimate.theta[plant.layout.poles]
     best, most = None, 0.0
-    for delay in ((), *_delays(chosen)):
-        to_beat = block_errors(chosen if delay else baseline.estimate, baseline.valid, baseline.n_init)
-        shapes = list(two_masses.shapes(poles, records.duration, dt))
+    for before, terms, values in ((baseline.estimate, (), ()), *_beside(chosen)):
+        to_beat = block_errors(before, baseline.valid, baseline.n_init)
+        shapes = list(two_masses.shapes(before.theta[plant.layout.poles], records.duration, dt))
         for side in SIDES:
             joint = Plant(
                 "position", 4, plant.nu, dt, two_outputs=plant.two_outputs, offset=plant.offset, taps=plant.taps,
-                joint=side,
-            )  # fmt: skip
-            if delay:
-                joint = replace(joint, scales=plant.scales).having([Term(EFFECTS["input_delay"]())])
-            fit = fit_plain(joint, records, shapes=shapes, of_terms=delay)
+                joint=side, scales=plant.scales,
+            ).having(terms)  # fmt: skip
+            fit = fit_plain(joint, records, shapes=shapes, of_terms=values)
             shapes = [*shapes[::4], list(fit.theta[joint.layout.poles])]  # both sides have the same poles
             gain = to_beat - block_errors(fit, baseline.valid, baseline.n_init)
             seen = two_masses.swings(fit.theta[joint.layout.poles], records.duration, dt)
@@ -60,15 +59,32 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
 
 
-def _delays(chosen: Estimate) -> tuple[tuple[float], ...]:
-    """List delays, in s, to begin with, as the delay and lags of a rigid drive tell; a joint may be part of them."""
-    plant = chosen.plant
-    late = sum(
-        float(chosen.theta[plant.part_of(term)][0])
-        for term in plant.terms
-        if term.effect.linear and plant.parameters_of(term)[0].unit == "s"
-    )
-    return tuple((share * late,) for share in (0.4, 0.8)) if late else ()
+def _beside(chosen: Estimate) -> Iterator[tuple[Estimate, list[Term], list[float]]]:
+    """Yield the effects of a rigid drive and their parameters; a delay in the place of its delay and lags.
+
+    A joint may be part of them, so the delay begins with two shares of their sum.
+    """
+    plant, terms, values, late = chosen.plant, [], [], 0.0
+    for term in plant.terms:
+        if term in plant.per_experiment:
+            continue
+        of_term = chosen.theta[plant.part_of(term)]
+        if term.effect.linear and plant.parameters_of(term)[0].unit == "s":
+            late += float(of_term[0])
+        else:
+            terms.append(term)
+            values += list(of_term)
+    if late:
+        delay = Term(EFFECTS["input_delay"]())
+        for share in SHARES:
+            joint = plant.having([*terms, delay])
+            theta = np.zeros(joint.size)
+            for term in terms:
+                theta[joint.part_of(term)] = chosen.theta[plant.part_of(term)]
+            theta[joint.part_of(delay)] = share * late
+            yield chosen, list(joint.terms), list(theta[joint.n_linear :])
+    elif terms:
+        yield chosen, terms, values
 
 
 def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:
