@@ -20,6 +20,7 @@ MAX_STEPS = 40
 # Of the variance of the errors: what a fit of the search may leave to gain. It moves no comparison of two models.
 TOLERANCE = 0.1
 ENOUGH_EXPERIMENTS = 3
+PIECE = 20  # samples: enough to find a state, too few for an error to grow
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +77,12 @@ class Baseline:
         """Set up the fit of a plant to the training records."""
         return Problem(plant, self.train, self.noise)
 
+    def in_pieces(self, plant: Plant) -> Problem:
+        """Set up the fit of a plant to short pieces of the training records, each from a start of its own."""
+        return Problem(plant, self.train.pieces(min(PIECE, self.train.mask.shape[1])), self.noise)
+
     def fit(
-        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray]], max_steps: int = MAX_STEPS
+        self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray | None]], max_steps: int = MAX_STEPS
     ) -> Estimate:
         """Fit a set of terms from several starts and return the best."""
         problem = self.problem(self.plant.having(terms))

@@ -8,7 +8,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.linear import WORTH_AN_ORDER, block_errors, find_baseline
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import Selection
-from simgap.greybox.trial import CONSISTENT
+from simgap.greybox.trial import CONSISTENT, in_most
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -31,9 +31,9 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         block_errors(fit, plain.valid, data.n_init) for fit in (chosen, plain.estimate, linear.estimate)
     )
     gain = with_effects - of_linear
-    error = gain.std() / math.sqrt(len(gain))
     # What the readings show needs no better simulation.
     if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
+        error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
-    return None if -gain.mean() > CONSISTENT * error else linear
+    return None if in_most(-gain) else linear

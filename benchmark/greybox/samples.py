@@ -71,6 +71,16 @@ class Records:
         """Return the first samples of each experiment."""
         return Records(np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt)
 
+    def pieces(self, samples: int) -> Records:
+        """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""
+        count = self.mask.shape[1] // samples
+
+        def cut(values: np.ndarray) -> np.ndarray:
+            whole = values[:, : count * samples]
+            return np.ascontiguousarray(whole.reshape(-1, samples, *values.shape[2:]))
+
+        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt)
+
     @property
     def duration(self) -> float:
         """Duration of the longest experiment, in s."""

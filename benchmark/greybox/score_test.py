@@ -94,7 +94,12 @@ def extend(
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
     if term.effect.moves_poles:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
-        return refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+        fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+        if not term.effect.errors_grow or plant.per_experiment:
+            return fit
+        # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
+        of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)
+        return min(fit, baseline.fit(plant.terms, [(of_pieces.theta, None)], max_steps), key=lambda fit: fit.squares)
     jacobian = jacobian or jacobian_of(baseline, estimate)
     scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
     if not scored or scored[0][0] < WORTH_A_REFIT:

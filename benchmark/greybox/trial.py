@@ -21,9 +21,9 @@ FALSE_NAMES = 1e-3
 WAYS = 2  # in which an effect may pass: by one-step errors and by free runs
 # What held-out data must add to the log-likelihood: odds of 20 to 1.
 HELD_OUT = 3.0
-# The mean gain of held-out blocks over its standard error: one in ten by chance.
-CONSISTENT = 1.3
+# Chance of a gain in held-out blocks where there is none; for normal gains, 1.3 standard errors of their mean.
 BY_CHANCE = 0.1
+CONSISTENT = 1.3
 BLOCKS = 20
 WORST = 10.0  # times the squares of the mean model: what the error of a held-out block counts at most
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
@@ -126,7 +126,14 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     # One simulation that grows without bound must not outweigh all other blocks.
     most = WORST * baseline.squares_of_mean / len(smaller.blocks)
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
-    # By ranks (Wilcoxon 1945): a valve that slips once too often is far off until it moves again, in one block.
+    return in_most(gain)
+
+
+def in_most(gain: np.ndarray) -> bool:
+    """Tell whether the errors of held-out blocks fall in the mean and by more than chance, by ranks (Wilcoxon 1945).
+
+    A valve that slips once too often is far off until it moves again, in one block, and the mean alone goes by that.
+    """
     return bool(gain.mean() > 0 and wilcoxon(gain, alternative="greater").pvalue < BY_CHANCE)
 
 

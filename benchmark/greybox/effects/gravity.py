@@ -27,6 +27,7 @@ class Gravity(ForceEffect):
     role: ClassVar[Role] = "force"
     replaces_spring: ClassVar[bool] = True
     moves_poles: ClassVar[bool] = True
+    errors_grow: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position",)
     confounders: ClassVar[dict[str, str]] = {
         "cubic_stiffness": "turn it beyond a quarter turn: a spring goes on pulling harder, gravity lets go",
@@ -36,11 +37,14 @@ class Gravity(ForceEffect):
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the amplitude, the angle at which it hangs at rest, and the size of the angle's unit."""
+        """Return the amplitude, the angle at which it hangs at rest, and the size of the angle's unit.
+
+        A pendulum that swings faster than half the sampling frequency is not seen.
+        """
         turn = 2 * math.pi / RADIANS.get(scales.y_unit, 1.0)
         radian = RADIANS.get(scales.y_unit, 1.0)
         return (
-            Parameter("amplitude", scales.force_unit, 0.0, 100 * scales.force_rms),
+            Parameter("amplitude", scales.force_unit, 0.0, (math.pi / scales.dt) ** 2 / radian),
             Parameter("angle at rest", scales.y_unit, -0.5 * turn, 0.5 * turn),
             Parameter("radians per unit", "", radian, radian, fixed=True),
         )
