@@ -36,7 +36,7 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     plant, records, dt = baseline.plant, baseline.train, baseline.plant.dt
     if plant.kind != "position" or plant.order != 2 or plant.joint or len(records.u[0]) < FEWEST_SAMPLES:
         return None
-    best, most = None, 0.0
+    best, least = None, math.inf
     for before, terms, values in ((baseline.estimate, (), ()), *_beside(chosen)):
         to_beat = block_errors(before, baseline.valid, baseline.n_init)
         shapes = list(two_masses.shapes(before.theta[plant.layout.poles], records.duration, dt))
@@ -47,16 +47,23 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
             ).having(terms)  # fmt: skip
             fit = fit_plain(joint, records, shapes=shapes, of_terms=values)
             shapes = [*shapes[::4], list(fit.theta[joint.layout.poles])]  # both sides have the same poles
-            gain = to_beat - block_errors(fit, baseline.valid, baseline.n_init)
+            left = block_errors(fit, baseline.valid, baseline.n_init)
+            gain = to_beat - left
             seen = two_masses.swings(fit.theta[joint.layout.poles], records.duration, dt)
             enough = gain.mean() > max(WORTH_AN_ORDER * to_beat.mean(), gain.std() / math.sqrt(len(gain)))
-            if seen and enough and gain.mean() / to_beat.mean() > most:
-                best, most = fit, float(gain.mean() / to_beat.mean())
+            if seen and enough and left.mean() < least:
+                best, least = fit, (1 - WORTH_AN_ORDER) * float(left.mean())
     if best is None:
         return None
-    without = best.plant.having(())
-    fit = descend(Problem(without, records, baseline.noise), best.theta[: without.size])
-    return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
+    return replace(baseline, estimate=scaled(_without_effects(best, baseline), records, channels, baseline.outputs))
+
+
+def _without_effects(fit: Estimate, baseline: Baseline) -> Estimate:
+    """Keep the joint that was found beside effects; without them no fit would, so the gains alone are fitted anew."""
+    plant = fit.plant.having(())
+    fixed = np.full(plant.size, bool(fit.plant.terms))
+    fixed[plant.layout.gains] = fixed[plant.layout.offset] = False
+    return descend(Problem(plant, baseline.train, baseline.noise), fit.theta[: plant.size], fixed=fixed)
 
 
 def _beside(chosen: Estimate) -> Iterator[tuple[Estimate, list[Term], list[float]]]:
