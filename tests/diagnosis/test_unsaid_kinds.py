@@ -14,6 +14,8 @@ from simgap.records import Channel, Channels
 # its velocity the readings tell the kinds.
 KNOWN_BY_THE_CARD = ("actuator_lag", "sensor_lag", "constant_load")
 FAST = [("cart", "coulomb_friction")]
+# A position on a spring with another bias in each record may as well be a number that settles elsewhere in each.
+ASKED = [("stage", "sensor_bias")]
 REST = [
     (rig, effect)
     for rig in RIGS
@@ -34,7 +36,8 @@ def told(answer):
 
 
 @pytest.mark.parametrize(
-    ("rig", "effect"), [*FAST, *(pytest.param(*case, marks=pytest.mark.slow) for case in REST[::3])]
+    ("rig", "effect"),
+    [*FAST, *(pytest.param(*case, marks=pytest.mark.slow) for case in REST[::3] if case not in ASKED)],
 )
 def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
     data = hide(rig, {effect: 1.0} if effect else {}, 0.05, seed=7)
@@ -64,8 +67,15 @@ def test_a_kind_that_is_said_is_not_asked_of_the_records():
     assert not any("is taken as" in check for check in answer.findings.checks)
 
 
-def test_where_the_name_hangs_on_the_kind_the_first_sentence_asks_for_it():
-    answer = diagnose(without_card(hide("cart", {"actuator_lag": 0.5}, 0.05, seed=14)), views_too=False)
+@pytest.mark.parametrize(
+    ("rig", "effect", "known"),
+    [
+        ("cart", "actuator_lag", "as a velocity it has actuator lag"),
+        pytest.param("stage", "sensor_bias", "as a position it has sensor bias", marks=pytest.mark.slow),
+    ],
+)
+def test_where_the_name_hangs_on_the_kind_the_first_sentence_asks_for_it(rig, effect, known):
+    answer = diagnose(without_card(hide(rig, {effect: 1.0}, 0.05, seed=7)), views_too=False)
     assert answer.verdict == "nothing_found"
     assert answer.findings.doubts[0].startswith("What y0 is decides the answer")
-    assert "as a velocity it has actuator lag" in answer.findings.doubts[0]
+    assert known in answer.findings.doubts[0]
