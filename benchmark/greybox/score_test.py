@@ -18,6 +18,7 @@ from simgap.registry import EFFECTS
 WORTH_A_REFIT = 2.0
 # Starts of an effect that are refitted: those with the best scores.
 STARTS = 2
+STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 
 
 def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
@@ -113,9 +114,20 @@ def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
         return estimate
     extended = extend(baseline, estimate, term)
     if extended is not None:
-        return extended
+        return from_other_poles(baseline, extended, baseline.problem(estimate.plant).squares(estimate.errors))
     plant = baseline.plant.having([*estimate.plant.terms, term])
     return baseline.fit(plant.terms, started(estimate, plant, term))
+
+
+def from_other_poles(baseline: Baseline, fit: Estimate, before: float) -> Estimate:
+    """Fit a model from other poles too where its last effect takes most of the squared error that was there `before`.
+
+    The poles that the model had then stood in for the effect, and no descent may lead away from them.
+    """
+    if fit.squares > STOOD_IN * before or fit.plant.joint:
+        return fit
+    afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
+    return min(fit, afresh, key=lambda fit: fit.squares)
 
 
 def jacobian_of(baseline: Baseline, estimate: Estimate) -> Jacobian:

@@ -10,12 +10,11 @@ from typing import TypeVar
 
 import numba
 
-from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
+from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
-from simgap.greybox.pole_search import refit_from_poles
-from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, jacobian_of
+from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
 T = TypeVar("T")
@@ -30,7 +29,6 @@ MAX_TERMS = 5
 FEW_STEPS = 6
 FINALISTS = 8
 MORE_STEPS = 8  # until they are compared again
-STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 
 Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
 
@@ -228,17 +226,12 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
 
 
 def _anew(baseline: Baseline, fits: list[Estimate], before: float) -> list[Estimate]:
-    """Fit the best effect from other poles too where it takes most of the error, and its special cases from its plant.
-
-    The poles that the model had before stood in for the effect, and no descent may lead away from them.
-    """
+    """Fit the best effect from other poles too, and its special cases from its plant."""
     if not fits:
         return fits
     best = min(fits, key=lambda fit: _cost(baseline, fit))
     others = [fit for fit in fits if fit is not best]
-    if best.squares < STOOD_IN * before and not best.plant.joint:
-        afresh = refit_from_poles(baseline.problem(best.plant), [best.theta], MAX_STEPS, TOLERANCE)
-        best = min(best, afresh, key=lambda fit: fit.squares)
+    best = from_other_poles(baseline, best, before)
     contained = best.plant.terms[-1].effect.contains
 
     def from_best(fit: Estimate) -> Estimate:

@@ -32,7 +32,7 @@ def answers(diagnosis):
     return [{cause.effect, *(s.effect for s in cause.confounded_with)} for cause in diagnosis.causes]
 
 
-@pytest.mark.parametrize("attempt", range(3))
+@pytest.mark.parametrize("attempt", [0, *(pytest.param(i, marks=pytest.mark.slow) for i in (1, 2))])
 def test_an_effect_that_is_hidden_in_a_rig_is_named_first_if_the_reference_can_see_it(attempt):
     rig, effect, seed = hidden_somewhere()
     outcome = solve(Case(rig, effect, 1.0, noise=0.05, colour=0.0, seed=seed))
@@ -70,6 +70,7 @@ def test_what_belongs_to_single_experiments_is_marked_and_never_forecast():
     assert np.std(np.diff(forecast[:, 0] - x.y[20:, 0])) > 0  # a plain simulation, without the drift
 
 
+@pytest.mark.slow
 def test_a_friction_in_the_gimbal_is_named():
     gimbal = Gimbal.linear(coulomb=0.15)
     dataset = gimbal_dataset(gimbal, seed=5, n_train=12, n_valid=4, n_test=3)

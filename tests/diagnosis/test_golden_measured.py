@@ -9,8 +9,7 @@ import pytest
 GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
 
 
-# It takes minutes, because gravity is tried from many poles beside friction that grows with the load.
-SLOW = ("servo_xl330",)
+SLOW = ("arm_pendulum", "damper_36lb", "dart_car", "servo_xl330")  # more than ten seconds each
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ def keys(rows):
     return sorted(map(store.key, rows))
 
 
+@pytest.mark.slow
 def test_the_rows_are_those_of_one_machine_and_a_node_killed_in_the_middle_costs_none(suite, tmp_path):
     chosen = suite("Mean", "RaisesInFit", "Crashes", "Hangs", "Sleeps", "IsNaN", timeout=6, seeds=4)
     here = {store.key(row): row for row in simgap.run(chosen, jobs=2, out=tmp_path / "here")}

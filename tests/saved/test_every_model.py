@@ -14,6 +14,7 @@ from simgap.records import Dataset, TrainingSet
 from simgap.registry import MODELS
 from simgap.saved.archive import save_model
 
+pytestmark = pytest.mark.slow
 AT_HAND = [name for name in MODELS if not MODELS.why_missing(name)]
 TRAINING = TrainingSet(tuple(toy_experiment(i, 250) for i in range(2)), (toy_experiment(2, 100),), N_INIT)
 IN_A_NEW_PROCESS = """
