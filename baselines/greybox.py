@@ -9,7 +9,7 @@ from simgap.greybox.effects.effect import Effect
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import Term, plants_of
-from simgap.greybox.score_test import add
+from simgap.greybox.score_test import add, from_other_poles
 from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS
 
@@ -37,7 +37,8 @@ class GreyBox(GreyBoxModel):
             for effect, plant, channel in placed:
                 # What is not simulated is left out of the records by the baseline itself.
                 if effect.simulated and (plant is None or plant == outputs):
-                    estimate = add(baseline, estimate, Term(effect, channel))
+                    larger = add(baseline, estimate, Term(effect, channel))
+                    estimate = from_other_poles(baseline, estimate, larger)
             self.plants.append(FittedPlant.fit(estimate, baseline, data.train + data.valid))
 
 

@@ -114,17 +114,17 @@ def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
         return estimate
     extended = extend(baseline, estimate, term)
     if extended is not None:
-        return from_other_poles(baseline, extended, baseline.problem(estimate.plant).squares(estimate.errors))
+        return extended
     plant = baseline.plant.having([*estimate.plant.terms, term])
     return baseline.fit(plant.terms, started(estimate, plant, term))
 
 
-def from_other_poles(baseline: Baseline, fit: Estimate, before: float) -> Estimate:
-    """Fit a model from other poles too where its last effect takes most of the squared error that was there `before`.
+def from_other_poles(baseline: Baseline, before: Estimate, fit: Estimate) -> Estimate:
+    """Fit a model from other poles too where its last effect takes most of the squared error that was there before.
 
     The poles that the model had then stood in for the effect, and no descent may lead away from them.
     """
-    if fit.squares > STOOD_IN * before or fit.plant.joint:
+    if fit.squares > STOOD_IN * baseline.problem(before.plant).squares(before.errors) or fit.plant.joint:
         return fit
     afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
     return min(fit, afresh, key=lambda fit: fit.squares)

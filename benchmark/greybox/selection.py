@@ -202,7 +202,7 @@ def compare(
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _anew(baseline, _race(baseline, begun[:FINALISTS], worth), before)
+    finalists = _anew(baseline, estimate, _race(baseline, begun[:FINALISTS], worth))
     compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
 
@@ -225,13 +225,13 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
     return fits
 
 
-def _anew(baseline: Baseline, fits: list[Estimate], before: float) -> list[Estimate]:
+def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Estimate]:
     """Fit the best effect from other poles too, and its special cases from its plant."""
     if not fits:
         return fits
     best = min(fits, key=lambda fit: _cost(baseline, fit))
     others = [fit for fit in fits if fit is not best]
-    best = from_other_poles(baseline, best, before)
+    best = from_other_poles(baseline, before, best)
     contained = best.plant.terms[-1].effect.contains
 
     def from_best(fit: Estimate) -> Estimate:
