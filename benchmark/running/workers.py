@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import sys
 import threading
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 _VARIABLES = (
@@ -57,11 +58,27 @@ def limit_threads(threads: int) -> None:
         torch.set_num_threads(threads)
     if (numba := sys.modules.get("numba")) is not None:
         numba.config.reload_config()  # reads the variable, as every compilation does, which refuses another number
-        numba.set_num_threads(threads)  # which starts OpenMP with a thread per core
+        with _nameless_locks():
+            numba.set_num_threads(threads)  # which starts OpenMP with a thread per core
     if "numpy" in sys.modules:
         from threadpoolctl import threadpool_limits
 
         threadpool_limits(threads)
+
+
+@contextlib.contextmanager
+def _nameless_locks() -> Iterator[None]:
+    """Have locks made as for processes that are forked, without a name in the system.
+
+    One with a name is left behind where the process is stopped just then, and is told of when the run ends.
+    """
+    before = multiprocessing.get_start_method()
+    if "fork" in multiprocessing.get_all_start_methods():
+        multiprocessing.set_start_method("fork", force=True)
+    try:
+        yield
+    finally:
+        multiprocessing.set_start_method(before, force=True)
 
 
 def threads_in_force() -> int:

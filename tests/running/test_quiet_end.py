@@ -55,3 +55,22 @@ def test_a_process_that_still_starts_when_the_run_ends_says_nothing(tmp_path):
         check=False, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+REGISTERED = """
+import multiprocessing.resource_tracker as tracker
+from simgap.running.workers import limit_threads
+import numba
+
+names = []
+tracker.register = lambda name, kind: names.append(name)
+limit_threads(1)
+assert not names, names
+"""
+
+
+def test_a_process_that_is_stopped_while_it_starts_leaves_no_lock_behind():
+    # As in the processes of jobs, where locks have names in the system.
+    start = "import multiprocessing; multiprocessing.set_start_method('forkserver')\n"
+    ended = subprocess.run([sys.executable, "-c", start + REGISTERED], check=False, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
