@@ -58,7 +58,7 @@ class Baseline:
     @cached_property
     def squares(self) -> float:
         """Squared errors of the plain model, weighted as those of all other models."""
-        return self.problem(self.plant).squares(self.estimate.errors)
+        return self.squares_of(self.estimate)
 
     @cached_property
     def squares_of_mean(self) -> float:
@@ -76,6 +76,10 @@ class Baseline:
     def problem(self, plant: Plant) -> Problem:
         """Set up the fit of a plant to the training records."""
         return Problem(plant, self.train, self.noise)
+
+    def squares_of(self, estimate: Estimate) -> float:
+        """Sum the squared training errors of any model, weighted by the noise of this one."""
+        return self.problem(estimate.plant).squares(estimate.errors)
 
     def in_pieces(self, plant: Plant) -> Problem:
         """Set up the fit of a plant to short pieces of the training records, each from a start of its own."""

@@ -19,14 +19,12 @@ INITIAL_STEPS = 15
 WEIGHTS = (0.01, 0.1, 1.0, 10.0)
 
 
-def initial_states(
-    plant: Plant, theta: Float[np.ndarray, " p"], records: Records, noise: Noise
-) -> Float[np.ndarray, "B q"]:
+def initial_states(problem: Problem, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "B q"]:
     """Find the states at the first sample of records of a few samples; the model is known."""
+    plant = problem.plant
     if not plant.n_local:
-        return np.zeros((len(records.u), 0))
-    fixed = np.ones(plant.size, dtype=bool)
-    return descend(Problem(plant, records, noise), theta, fixed=fixed, max_steps=INITIAL_STEPS).local
+        return np.zeros((len(problem.records.u), 0))
+    return descend(problem, theta, fixed=np.ones(plant.size, dtype=bool), max_steps=INITIAL_STEPS).local
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ def usual_start(plant: Plant, estimate: Estimate, records: Records, noise: Noise
     precision = np.linalg.inv(scatter + 1e-9 * np.eye(q)) / size / size[:, None]
     variance = float(np.sum(noise.whiten(estimate.errors) ** 2)) / (records.samples * plant.ny)
     beginning, whole = Problem(plant, records.beginning(n_init), noise), Problem(plant, records, noise)
-    found = initial_states(plant, theta, records.beginning(n_init), noise)
+    found = initial_states(beginning, theta)
     tried = [UsualStart(starts.mean(axis=0), weight * variance * precision) for weight in WEIGHTS]
 
     def squares(local: np.ndarray) -> float:

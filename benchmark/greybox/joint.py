@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +37,8 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     if plant.kind != "position" or plant.order != 2 or plant.joint or len(records.u[0]) < FEWEST_SAMPLES:
         return None
     best, least = None, math.inf
-    for before, terms, values in ((baseline.estimate, (), ()), *_beside(chosen)):
+    beside = ((chosen, terms, values) for terms, values in _beside(chosen))
+    for before, terms, values in ((baseline.estimate, (), ()), *beside):
         to_beat = block_errors(before, baseline.valid, baseline.n_init)
         shapes = list(two_masses.shapes(before.theta[plant.layout.poles], records.duration, dt))
         for side in SIDES:
@@ -66,32 +67,26 @@ def _without_effects(fit: Estimate, baseline: Baseline) -> Estimate:
     return descend(Problem(plant, baseline.train, baseline.noise), fit.theta[: plant.size], fixed=fixed)
 
 
-def _beside(chosen: Estimate) -> Iterator[tuple[Estimate, list[Term], list[float]]]:
+def _beside(chosen: Estimate) -> Iterator[tuple[Sequence[Term], list[float]]]:
     """Yield the effects of a rigid drive and their parameters; a delay in the place of its delay and lags.
 
     A joint may be part of them, so the delay begins with two shares of their sum.
     """
-    plant, terms, values, late = chosen.plant, [], [], 0.0
+    plant, values, late = chosen.plant, {}, 0.0
     for term in plant.terms:
         if term in plant.per_experiment:
             continue
-        of_term = chosen.theta[plant.part_of(term)]
+        of_term = list(chosen.theta[plant.part_of(term)])
         if term.effect.linear and plant.parameters_of(term)[0].unit == "s":
             late += float(of_term[0])
         else:
-            terms.append(term)
-            values += list(of_term)
-    if late:
-        delay = Term(EFFECTS["input_delay"]())
-        for share in SHARES:
-            joint = plant.having([*terms, delay])
-            theta = np.zeros(joint.size)
-            for term in terms:
-                theta[joint.part_of(term)] = chosen.theta[plant.part_of(term)]
-            theta[joint.part_of(delay)] = share * late
-            yield chosen, list(joint.terms), list(theta[joint.n_linear :])
-    elif terms:
-        yield chosen, terms, values
+            values[term.key] = term, of_term
+    delay = Term(EFFECTS["input_delay"]())
+    for begun in [{delay.key: (delay, [share * late])} for share in SHARES] if late else [{}]:
+        both = values | begun
+        if both:
+            terms = plant.having([term for term, _ in both.values()]).terms
+            yield terms, [value for term in terms for value in both[term.key][1]]
 
 
 def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:

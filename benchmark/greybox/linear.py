@@ -174,7 +174,7 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
 def errors_on(fit: Estimate, records: Records, n_init: int) -> np.ndarray:
     """Simulate other records with a fitted model, each from its first n_init samples: errors [E, T, ny]."""
     noise = white(records.sizes)
-    start = initial_states(fit.plant, fit.theta, records.beginning(n_init), noise)
+    start = initial_states(Problem(fit.plant, records.beginning(n_init), noise), fit.theta)
     return Problem(fit.plant, records, noise).errors(fit.theta, start)
 
 

@@ -89,9 +89,9 @@ class FittedPlant:
     def _start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
         """Find the initial states: from the first n samples, and from where the training records start."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
-        beginning = Records.measured(u[:, :n], y_init, plant.dt)
-        found = initial_states(plant, theta, beginning, self.noise)
-        return self.usual.beside(Problem(plant, beginning, self.noise), theta, found) if self.usual else found
+        beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
+        found = initial_states(beginning, theta)
+        return self.usual.beside(beginning, theta, found) if self.usual else found
 
     def contributions(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]

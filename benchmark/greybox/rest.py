@@ -185,8 +185,9 @@ class _Regressions:
     ) -> _Regressions:
         """Fit with every ridge, without each fold in turn; the moments of the folds are all that it takes."""
         means, spreads = phi.mean(axis=0), phi.std(axis=0)
+        spreads = np.where(spreads > 0, spreads, 1.0)
         phi = phi - means
-        phi /= np.where(spreads > 0, spreads, 1.0)
+        phi /= spreads
         inside = [fold == k for k in np.unique(fold)]
         grams, moments = [phi[i].T @ phi[i] for i in inside], [phi[i].T @ e[i] for i in inside]
         gram, moment = np.sum(grams, axis=0), np.sum(moments, axis=0)
@@ -199,7 +200,7 @@ class _Regressions:
         best = np.argmin(after.sum(axis=1), axis=0)  # [ny]
         columns = np.arange(e.shape[1])
         fits = [_solved(gram, moment[:, j], RIDGES[best[j]] * len(e)) for j in columns]
-        coefficients = np.stack(fits, axis=1) / np.where(spreads > 0, spreads, 1.0)[:, None]
+        coefficients = np.stack(fits, axis=1) / spreads[:, None]
         return cls(means, coefficients, before, after[best, :, columns].T)
 
 

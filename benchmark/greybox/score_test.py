@@ -53,7 +53,7 @@ def score(
     """
     noise = baseline.noise
     e = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)
-    ee = baseline.problem(estimate.plant).squares(estimate.errors)
+    ee = baseline.squares_of(estimate)
     extended = baseline.problem(plant)
     without = baseline.problem(estimate.plant).simulator.run(estimate.theta, estimate.local)
     scored = []
@@ -124,7 +124,7 @@ def from_other_poles(baseline: Baseline, before: Estimate, fit: Estimate) -> Est
 
     The poles that the model had then stood in for the effect, and no descent may lead away from them.
     """
-    if fit.squares > STOOD_IN * baseline.problem(before.plant).squares(before.errors) or fit.plant.joint:
+    if fit.squares > STOOD_IN * baseline.squares_of(before) or fit.plant.joint:
         return fit
     afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
     return min(fit, afresh, key=lambda fit: fit.squares)

@@ -190,7 +190,7 @@ def compare(
     if key in compared:
         return ranked([assess(baseline, trial.estimate, noise_order) for trial in compared[key]])
     jacobian = jacobian_of(baseline, estimate)
-    before = baseline.problem(estimate.plant).squares(estimate.errors)
+    before = baseline.squares_of(estimate)
 
     def begin(term: Term) -> Estimate | None:
         return extend(baseline, estimate, term, jacobian, FEW_STEPS)

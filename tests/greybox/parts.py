@@ -157,7 +157,7 @@ def own_numbers_of_each(made, data, weighing):
 
 def initial_states(made, data, weighing):
     """The states [E, q] at the first sample of each record."""
-    return starts.initial_states(made.plant, made.theta, data, weighing)
+    return starts.initial_states(problem_of(made, data, weighing), made.theta)
 
 
 def problem_of(made, data, weighing):
