@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.joint import is_better, on_joint, with_joint
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.linear_rival import linear_rival
@@ -18,6 +17,7 @@ from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
 from simgap.greybox.position_and_velocity import with_kind, with_velocity
 from simgap.greybox.problem import Problem
+from simgap.greybox.rivals import of_better_joint, of_better_order
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.selection import Selection, select
 from simgap.records import Channels, TrainingSet
@@ -53,6 +53,7 @@ def identify(data: TrainingSet) -> list[Identified]:
         settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
         selection = _selected(data, of_kind, outputs, settled)
+        selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
         linear = linear_rival(data, of_kind, selection)
         best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
         identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
@@ -69,16 +70,6 @@ def channels_of(identified: Sequence[Identified], data: TrainingSet) -> Channels
 
 
 def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
-    """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
-    rigid = _rigid(data, channels, outputs, settled)
-    joint = with_joint(rigid, channels)
-    if joint is None or not is_better(on_joint(joint, rigid.trial.estimate), joint, rigid):
-        return rigid
-    flexible = select(joint)
-    return flexible if is_better(flexible.trial.estimate, joint, rigid) else rigid
-
-
-def _rigid(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
     """Select effects; again with every reading where those that were left out are not far off the chosen model.
 
     The error of a model that knows no delay is large for one sample after every step, as that of a bad reading.

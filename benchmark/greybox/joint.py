@@ -11,13 +11,12 @@ import numpy as np
 from simgap.greybox import two_masses
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.linear import WORTH_AN_ORDER, block_errors, scaled
-from simgap.greybox.noise import schwarz_order
+from simgap.greybox.held_out import block_errors
+from simgap.greybox.linear import WORTH_AN_ORDER, scaled
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
-from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import MATTERS, assess
+from simgap.greybox.selection import Selection
 from simgap.records import Channels
 from simgap.registry import EFFECTS
 
@@ -99,14 +98,3 @@ def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:
         else:
             theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
     return joint.fit(plant.terms, [(theta, local)])
-
-
-def is_better(estimate: Estimate, joint: Baseline, rigid: Selection) -> bool:
-    """Tell whether a drive with a joint errs clearly less, and has the higher score under noise of one memory."""
-    chosen, noise = rigid.trial.estimate, rigid.baseline.noise
-    squares = [float(np.sum(noise.whiten(fit.errors) ** 2)) for fit in (estimate, chosen)]
-    if squares[0] > (1 - MATTERS) * squares[1]:
-        return False
-    order = max(rigid.noise_order, schwarz_order(estimate.errors, joint.train.mask, joint.resolution))
-    flexible = assess(joint, estimate, order)
-    return flexible.score > assess(rigid.baseline, chosen, order).score + BETTER

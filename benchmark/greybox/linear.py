@@ -11,21 +11,21 @@ import numpy as np
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.initial_states import initial_states
+from simgap.greybox.held_out import block_errors, errors_on, in_most
 from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import RESOLUTION, Records, excerpts
+from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.score_test import add, candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.trial import score_gain
 from simgap.records import Channels, Experiment, Kind
 
 MAX_ORDER = 4
 # A higher order must lower the held-out error by this share, or it is not worth it.
 WORTH_AN_ORDER = 0.015
-BLOCKS = 20
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
 SMOOTH = 20.0
 EARLY = 0.25  # samples
@@ -64,16 +64,23 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers))
 
     baseline = baseline_of(models[-1])
-    to_beat = block_errors(baseline.estimate, baseline.valid, n_init).mean()
     for simpler in (fit for fit in models[:-1] if not fit.plant.zeros):
-        # A higher order is no answer where a delay or another law of the plant, which cost no more, do as well.
+        # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
-        if any(block_errors(add(other, other.estimate, term), held_out, n_init).mean() <= to_beat for term in instead):
+        if any(_does_as_well(add(other, other.estimate, term), baseline) for term in instead):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
+
+
+def _does_as_well(other: Estimate, baseline: Baseline) -> bool:
+    """Tell whether a model scores higher than the plain one, and does not err more in most held-out blocks."""
+    if score_gain(baseline, other, baseline, baseline.estimate) <= 0:
+        return False
+    after, before = (block_errors(fit, baseline.valid, baseline.n_init) for fit in (other, baseline.estimate))
+    return not in_most(after - before)
 
 
 def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
@@ -169,18 +176,3 @@ def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ..
     theta[plant.layout.zeros][: before.zeros] = held.theta[before.layout.zeros]
     theta[plant.layout.gains][:: len(taps)] = held.theta[before.layout.gains]
     return descend(Problem(plant, train, noise), theta, held.local)
-
-
-def errors_on(fit: Estimate, records: Records, n_init: int) -> np.ndarray:
-    """Simulate other records with a fitted model, each from its first n_init samples: errors [E, T, ny]."""
-    noise = white(records.sizes)
-    start = initial_states(Problem(fit.plant, records.beginning(n_init), noise), fit.theta)
-    return Problem(fit.plant, records, noise).errors(fit.theta, start)
-
-
-def block_errors(fit: Estimate, valid: Records, n_init: int) -> np.ndarray:
-    """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks."""
-    errors = errors_on(fit, valid, n_init) / valid.sizes
-    squares = np.where(valid.mask[:, :, None], errors**2 + RESOLUTION**2, 0.0)
-    blocks = np.array_split(squares, min(max(2, BLOCKS // len(squares)), squares.shape[1]), axis=1)
-    return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.linear import WORTH_AN_ORDER, block_errors, find_baseline
+from simgap.greybox.held_out import block_errors, in_most
+from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline
 from simgap.greybox.position_and_velocity import with_kind
-from simgap.greybox.selection import Selection
-from simgap.greybox.trial import CONSISTENT, in_most
+from simgap.greybox.selection import BETTER, Selection
+from simgap.greybox.trial import CONSISTENT, score_gain
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -36,4 +37,5 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
-    return None if in_most(-gain) else linear
+    higher = score_gain(plain, chosen, linear, linear.estimate) > BETTER
+    return None if higher and not in_most(gain) else linear

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,6 +19,7 @@ from simgap.records import Channels, Kind
 # Of poles, per sample.
 FASTEST_TANK = 5.0
 FASTEST = 1e6
+SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
 
 
 def plants_of(channels: Channels) -> list[tuple[int, ...]]:
@@ -35,6 +37,7 @@ class PlantScales:
 
     inputs: tuple[SignalScales, ...]
     outputs: tuple[SignalScales, ...]
+    fastest: float = math.inf  # 1/s, of the poles of the plain model
 
     @property
     def output_sizes(self) -> Float[np.ndarray, " ny"]:
@@ -264,8 +267,12 @@ class Plant:
 
     @cached_property
     def substeps(self) -> int:
-        """Substeps per sample: what the most demanding term asks for."""
-        return 1 if self.imposed else max((term.effect.substeps for term in self.terms), default=1)
+        """Substeps per sample: what the most demanding term asks for, or fewer where the plant is slow."""
+        if self.imposed:
+            return 1
+        asked = max((term.effect.substeps for term in self.terms), default=1)
+        enough = SUBSTEPS * self.scales.fastest * self.dt if self.scales else math.inf
+        return max(1, math.ceil(min(asked, enough)))
 
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """Return A of z' = A z + (inputs and forces)."""

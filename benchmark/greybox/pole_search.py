@@ -14,6 +14,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 FINALISTS = 2
+FEW_STEPS, MAX_STEPS = 10, 40  # of a fit until the finalists are compared: with effects, of a plain model
 LARGEST_RATIO = 1e6
 
 
@@ -45,7 +46,8 @@ def fit_plain(
         solved = descend(problem, theta, fixed=~linear, max_steps=2)
         tried.append((solved.squares, solved.theta, solved.local))
     tried.sort(key=lambda trial: trial[0])
-    fits = [descend(problem, theta, local) for _, theta, local in tried[:FINALISTS]]
+    few = FEW_STEPS if len(of_terms) else MAX_STEPS
+    fits = [descend(problem, theta, local, max_steps=few) for _, theta, local in tried[:FINALISTS]]
     best = min(fits, key=lambda fit: fit.squares)
     # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)

@@ -92,11 +92,11 @@ def extend(
     """
     plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
     if term in plant.per_experiment:
-        return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
+        return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
     if term.effect.moves_poles:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
-        if not term.effect.errors_grow or plant.per_experiment:
+        if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
             return fit
         # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
         of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)

@@ -44,7 +44,9 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
-    return PlantScales(tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny)))
+    poles = np.linalg.eigvals(plant.matrix(estimate.theta)) if plant.order else np.zeros(1)
+    at_inputs, at_outputs = tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny))
+    return PlantScales(at_inputs, at_outputs, float(np.max(np.abs(poles))))
 
 
 def _stroke(v: np.ndarray, v_max: float, records: Records) -> float:

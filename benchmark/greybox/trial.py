@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, wilcoxon
+from scipy.stats import chi2
 
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.noise import log_likelihood
+from simgap.greybox.held_out import BLOCKS, in_most
+from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
 from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, candidates
@@ -21,10 +22,7 @@ FALSE_NAMES = 1e-3
 WAYS = 2  # in which an effect may pass: by one-step errors and by free runs
 # What held-out data must add to the log-likelihood: odds of 20 to 1.
 HELD_OUT = 3.0
-# Chance of a gain in held-out blocks where there is none; for normal gains, 1.3 standard errors of their mean.
-BY_CHANCE = 0.1
 CONSISTENT = 1.3
-BLOCKS = 20
 WORST = 10.0  # times the squares of the mean model: what the error of a held-out block counts at most
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
@@ -82,6 +80,14 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     )  # fmt: skip
 
 
+def score_gain(one: Baseline, estimate: Estimate, other: Baseline, without: Estimate) -> float:
+    """Score of one model less that of another, under noise of one memory: that of the more demanding one."""
+    fits, train = (estimate, without), one.train
+    order = max(schwarz_order(fit.errors, train.mask, train.resolution) for fit in fits)
+    scores = [assess(baseline, fit, order).score for baseline, fit in zip((one, other), fits, strict=True)]
+    return scores[0] - scores[1]
+
+
 def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
 
@@ -127,14 +133,6 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     most = WORST * baseline.squares_of_mean / len(smaller.blocks)
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     return in_most(gain)
-
-
-def in_most(gain: np.ndarray) -> bool:
-    """Tell whether the errors of held-out blocks fall in the mean and by more than chance, by ranks (Wilcoxon 1945).
-
-    A valve that slips once too often is far off until it moves again, in one block, and the mean alone goes by that.
-    """
-    return bool(gain.mean() > 0 and wilcoxon(gain, alternative="greater").pvalue < BY_CHANCE)
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:
