@@ -46,9 +46,10 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     rmse = [np.where(error < GROWN, error * spread, np.inf) for error in rmse]
     losses = [np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares]
     experiment = np.repeat(np.arange(len(dataset.test)), [len(x.y[n:]) for x in dataset.test])
-    shares = (value if value > -GROWN else -np.inf for value in share_with_interval(*losses, experiment))
+    share, low, high = (value if value > -GROWN else -np.inf for value in share_with_interval(*losses, experiment))
     names = [channel.name for channel in dataset.channels.outputs]
-    return Gain(*(dict(zip(names, map(float, errors), strict=True)) for errors in rmse), *shares)
+    rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
+    return Gain(rmse_before, rmse_after, share, low, high)
 
 
 def share_with_interval(

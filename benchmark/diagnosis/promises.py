@@ -58,19 +58,19 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
     """
     listed = [(plant, term) for plant in _in_order(evidence) for term in plant.terms]
     least = 0 if any(plant.selection.baseline.outliers for plant in evidence) else 1
-    found = _causes(evidence, profiles)
+    found, suspected = _causes(evidence, profiles), None
     for count in range(len(listed), least - 1, -1):
         kept = [only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
         model = GreyBoxModel([plant.identified.plant for plant in kept])
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
         gain = gains.measure(dataset, before, after)
-        if count == len(listed):
-            suspected = Promise((), found, (), model, after, gain)
+        suspected = suspected or Promise((), found, (), model, after, gain)
         if gain.low > 0:
             causes = found if count == len(listed) else _causes(kept, profiles)
             named = {(cause.effect, cause.channel) for cause in causes}
             rest = tuple(cause for cause in found if (cause.effect, cause.channel) not in named)
             return Promise(causes, rest, tuple(kept), model, after, gain)
+    assert suspected is not None, "there is something to promise"
     return suspected
 
 

@@ -81,6 +81,6 @@ def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], s
         records = Records.of(excerpts(data.train), outputs)
         errors = Problem(chosen.plant, records, baseline.noise).errors(chosen.theta, chosen.local)
         left_out = records.mask & ~baseline.train.mask
-        if np.mean(flag(errors, records.mask).any(axis=2)[left_out]) < STILL_FAR:
+        if np.mean(np.any(flag(errors, records.mask), axis=2)[left_out]) < STILL_FAR:
             return select(find_baseline(*whole, every_reading=True))
     return selection

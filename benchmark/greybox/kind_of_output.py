@@ -99,7 +99,8 @@ def settle(data: TrainingSet, channels: Channels, output: int) -> Settled:
     plain = [s for s in left if s.lead is None]
     unclaimed = [s for s in plain if s.hypothesis.kind == "other"]
     chosen = min(unclaimed or plain or left, key=lambda s: (s.trial.cost, -s.trial.score))
-    one, same = chosen.hypothesis, [s.hypothesis.kind for s in left if s is not chosen and _same(s.lead, chosen.lead)]
+    one = chosen.hypothesis
+    same: list[Kind] = [s.hypothesis.kind for s in left if s is not chosen and _same(s.lead, chosen.lead)]
     return Settled(one.kind, one.baseline, one.compared or {}, _rivals(chosen, left), tuple(same))
 
 

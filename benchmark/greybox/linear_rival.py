@@ -8,8 +8,8 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline
 from simgap.greybox.position_and_velocity import with_kind
-from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import CONSISTENT, score_gain
+from simgap.greybox.selection import Selection
+from simgap.greybox.trial import CONSISTENT
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -26,7 +26,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     plain, chosen = selection.baseline, selection.trial.estimate
     if plain.plant.kind == "other" or len(plain.outputs) > 1 or chosen.plant.per_experiment:
         return None
-    whole = data.train, data.valid, with_kind(channels, plain.outputs[0], "other"), plain.outputs, data.n_init
+    whole = data.train, data.valid, with_kind(channels, plain.outputs[0], "other"), list(plain.outputs), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     with_effects, without, of_linear = (
         block_errors(fit, plain.valid, data.n_init) for fit in (chosen, plain.estimate, linear.estimate)
@@ -37,5 +37,4 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
-    higher = score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    return None if higher and not in_most(gain) else linear
+    return None if in_most(-gain) else linear

@@ -199,7 +199,7 @@ class _Regressions:
                 after[r, k] = before[k] + np.sum(c * (grams[k] @ c - 2 * moments[k]), axis=0)
         best = np.argmin(after.sum(axis=1), axis=0)  # [ny]
         columns = np.arange(e.shape[1])
-        fits = [_solved(gram, moment[:, j], RIDGES[best[j]] * len(e)) for j in columns]
+        fits = [_solved(gram, moment[:, j], float(RIDGES[best[j]]) * len(e)) for j in columns]
         coefficients = np.stack(fits, axis=1) / spreads[:, None]
         return cls(means, coefficients, before, after[best, :, columns].T)
 

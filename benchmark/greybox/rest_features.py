@@ -82,7 +82,7 @@ class Features:
         yield _earlier(phi, 1)
         order = len(self.denominator) - 1
         if order:
-            passed = lfilter([1.0], self.denominator, phi, axis=1)
+            passed = np.asarray(lfilter([1.0], self.denominator, phi, axis=1))
             yield from (_earlier(passed, lag) for lag in range(1, order + 1))
         yield from (_mean(phi, samples) for samples in self.design.after)
 

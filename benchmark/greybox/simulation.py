@@ -133,14 +133,15 @@ class Simulator:
         if not terms:
             return self._u[channel]
         values = [theta[self.plant.part_of(term)] for term in terms]
-        known = [] if start is None else [self.plant.remembered.index(t) for t in terms if t in self.plant.remembered]
-        key = np.concatenate([[channel], *values, *(start[:, i] for i in known)]).tobytes()
+        remembered = () if start is None else zip(self.plant.remembered, start.T, strict=False)
+        begun = {term.key: of_term for term, of_term in remembered if term in terms}
+        key = np.concatenate([[channel], *values, *begun.values()]).tobytes()
         if key not in self._drives:
             u = self._u[channel]
             for term, p in zip(terms, values, strict=True):
                 assert isinstance(term.effect, InputEffect)
-                if known and term in self.plant.remembered:
-                    u = term.effect.term_from(u, p, self.h, start[:, self.plant.remembered.index(term)])
+                if term.key in begun:
+                    u = term.effect.term_from(u, p, self.h, begun[term.key])
                 else:
                     u = term.effect.term(u, p, self.h)
             if len(self._drives) > 1 + len(values):

@@ -92,9 +92,9 @@ class Model(NamedTuple):
         return (layout.poles, layout.gains, layout.offset, layout.zeros, layout.velocity)[number]
 
 
-def model(kind, dt, shape, gain, effects=(), two_outputs=False, offset=None, zeros=()):
-    """A plant with effects, each at its first start."""
-    both = PlantScales((SCALES,), (SCALES, SCALES))
+def model(kind, dt, shape, gain, effects=(), two_outputs=False, offset=None, zeros=(), fastest=np.inf):
+    """A plant with effects, each at its first start; its plain model had a pole of rate `fastest`."""
+    both = PlantScales((SCALES,), (SCALES, SCALES), fastest)
     plant = Plant(
         kind, len(shape), 1, dt, zeros=len(zeros), two_outputs=two_outputs, offset=offset is not None, scales=both
     ).having([term(name) for name in effects])
