@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from simgap.exports.subjects import Subject
+from simgap.records import Channels
 
 A_LINE = 5  # numbers
 FEW = 4
@@ -29,3 +30,10 @@ def numbers(values: Iterable[float], indent: str = "    ") -> str:
         return ", ".join(texts)
     lines = [", ".join(texts[i : i + A_LINE]) for i in range(0, len(texts), A_LINE)]
     return "\n" + "".join(f"{indent}{line},\n" for line in lines)
+
+
+def variable_names(channels: Channels) -> tuple[list[str], list[str]]:
+    """Name inputs and outputs so that no two are the same."""
+    inputs, outputs = ([c.name for c in part] for part in (channels.inputs, channels.outputs))
+    twice = {*inputs} & {*outputs}
+    return inputs, [f"{name} (output)" if name in twice else name for name in outputs]

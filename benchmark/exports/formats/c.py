@@ -39,25 +39,7 @@ void model_step(double *s, const double *u, double *y);
 
 #endif
 """
-MAIN = """\
-/* Reads the state, then the inputs of each sample; prints the outputs. */
-#include <stdio.h>
-#include "model.h"
-
-int main(void) {
-    static double s[MODEL_STATES + 1];
-    double u[MODEL_INPUTS], y[MODEL_OUTPUTS];
-    int i, got;
-    for (i = 0; i < MODEL_STATES; i++)
-        if (scanf("%lf", &s[i]) != 1) return 1;
-    for (;;) {
-        for (got = 0; got < MODEL_INPUTS && scanf("%lf", &u[got]) == 1; got++) {}
-        if (got < MODEL_INPUTS) return got ? 1 : 0;
-        model_step(s, u, y);
-        for (i = 0; i < MODEL_OUTPUTS; i++) printf(i + 1 < MODEL_OUTPUTS ? "%.17g " : "%.17g\\n", y[i]);
-    }
-}
-"""
+C = Path(__file__).parents[1] / "c"  # what is the same for every model
 
 refusal = refusal_of_step
 
@@ -91,7 +73,8 @@ def sources(subject: Subject) -> dict[str, str]:
 
 def write(subject: Subject, folder: Path) -> None:
     """Write model.c, model.h and main.c."""
-    for name, text in {**sources(subject), "main.c": MAIN}.items():
+    main = (C / "main.c").read_text(encoding="utf-8")
+    for name, text in {**sources(subject), "main.c": main}.items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
