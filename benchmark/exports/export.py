@@ -127,12 +127,12 @@ def _subject(
         x = _record(dataset, experiment)
         fitted.fit(dataset.training, seed)
         training = dataset.training.train + dataset.training.valid
-    reach = subjects.input_range(training or (x,))
+    of_u, of_y = subjects.ranges(training or (x,))
     records = [
         subjects.measured_record(name, fitted, about, x),
-        subjects.friction_record(fitted, about, abs(reach).max(axis=0)),
+        subjects.friction_record(fitted, about, abs(of_u).max(axis=0)),
     ]
-    return Subject(name, fitted, about, tuple(one for one in records if one is not None), reach)
+    return Subject(name, fitted, about, tuple(one for one in records if one is not None), of_u, of_y)
 
 
 def _record(data: Dataset, name: str | None) -> Experiment:

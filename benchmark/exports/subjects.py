@@ -61,6 +61,7 @@ class Subject:
     fitted_on: FittedOn
     records: tuple[CheckRecord, ...]
     input_range: Float[np.ndarray, "2 nu"]  # the least and the largest value of each input
+    output_range: Float[np.ndarray, "2 ny"]
 
     @cached_property
     def form(self) -> StepForm:
@@ -141,7 +142,8 @@ def _breakaway(fitted: Any) -> float:
     return float(sum(holds)) / gain
 
 
-def input_range(experiments: Sequence[Experiment]) -> Float[np.ndarray, "2 nu"]:
-    """Measure the least and the largest value of each input."""
-    u = np.concatenate([x.u for x in experiments])
-    return np.stack([u.min(axis=0), u.max(axis=0)])
+def ranges(experiments: Sequence[Experiment]) -> tuple[Float[np.ndarray, "2 nu"], Float[np.ndarray, "2 ny"]]:
+    """Measure the least and the largest value of each input and output."""
+    signals = [np.concatenate([getattr(x, name) for x in experiments]) for name in ("u", "y")]
+    u, y = (np.stack([signal.min(axis=0), signal.max(axis=0)]) for signal in signals)
+    return u, y

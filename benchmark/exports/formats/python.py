@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from simgap.exports.folders import About
 from simgap.exports.subjects import CheckRecord, Subject, refusal_of_step
-from simgap.exports.texts import heading, numbers
+from simgap.exports.texts import heading, numbers, variable_names
 from simgap.records import UnusableInput
 
 FILE = "model.py"
@@ -43,23 +43,24 @@ def missing() -> str:
     return ""
 
 
-def text(subject: Subject) -> str:
-    """Write the whole file."""
+def parts(subject: Subject, imports: str = "") -> str:
+    """Write what comes before the functions: the heading, imports, names of the channels, and numbers."""
     form, about = subject.form, subject.fitted_on
+    inputs, outputs = variable_names(about.channels)
     lines = [f'"""{heading(subject)}', "", "step(s, u, y) fills the outputs y of a sample from its inputs u and takes",
              "the state s from before the sample to before the next one; all three are lists of floats.", '"""', "",
-             "import math", "", f"DT = {about.dt!r}  # s, the time from sample to sample",
-             f"INPUTS = {[c.name for c in about.channels.inputs]!a}",
-             f"OUTPUTS = {[c.name for c in about.channels.outputs]!a}"]  # fmt: skip
-    lines += [f"{name} = [{numbers(value, '    ')}]" for name, value in form.constants.items()]
-    lines.append(f"REST = [{numbers(form.rest, '    ')}]  # the state at rest")
-    lines.append(f"START = [{numbers(subject.records[0].start, '    ')}]  # the state that record.csv starts from")
-    return "\n".join(lines) + "\n\n\n" + form.source + REST_OF_FILE
+             "import math", *(["", imports] if imports else [""]),
+             f"DT = {about.dt!r}  # s, the time from sample to sample",
+             f"INPUTS = {inputs!a}", f"OUTPUTS = {outputs!a}"]  # fmt: skip
+    lines += [f"{name} = [{numbers(value)}]" for name, value in form.constants.items()]
+    lines.append(f"REST = [{numbers(form.rest)}]  # the state at rest")
+    lines.append(f"START = [{numbers(subject.records[0].start)}]  # the state that record.csv starts from")
+    return "\n".join(lines) + "\n"
 
 
 def write(subject: Subject, folder: Path) -> None:
     """Write model.py."""
-    (folder / FILE).write_text(text(subject), encoding="utf-8")
+    (folder / FILE).write_text(parts(subject) + "\n\n" + subject.form.source + REST_OF_FILE, encoding="utf-8")
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:
