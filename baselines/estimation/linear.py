@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.estimation import stepping
+from simgap.baselines.estimation import graph, stepping
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import TooFewSamples
 from simgap.baselines.estimation.fitted import LinearFit, Row
@@ -103,6 +103,10 @@ class LinearModel(ABC):
     def step_start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
         """Return the state of that step before sample n."""
         return stepping.start(self.polynomial, u, y_init)
+
+    def to_onnx(self, n: int) -> Any:
+        """Convert to an ONNX graph that simulates as `simulate` does, from n measured samples."""
+        return graph.build(self.polynomial, n)
 
     def summary(self) -> str:
         """Describe the coefficients with standard errors, the poles, and the residual analysis.

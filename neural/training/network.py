@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from simgap.neural.training import checkpoints, sequences, stepping, weights, windows
+from simgap.neural.training import checkpoints, graph, sequences, stepping, weights, windows
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
 from simgap.neural.training.loop import History, Recipe, figures, range_test, train
@@ -172,6 +172,10 @@ class Network(ABC):
     def step_start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
         """Return the state of that step before sample n."""
         return stepping.start(self, u, y_init)
+
+    def to_onnx(self, n: int) -> Any:
+        """Convert to an ONNX graph that simulates as `simulate` does, from any number of measured samples."""
+        return graph.build(self)
 
     def hyper_parameters(self) -> dict[str, Any]:
         """Give the fields that a user may choose."""
