@@ -72,8 +72,10 @@ def _read_record(folder: Path, text: dict[str, Any], nu: int, ny: int) -> CheckR
     name, n = Path(str(text["file"])).name, int(text["simulated_from_row"])
     if not (folder / name).is_file():
         raise UnusableInput(f"{folder / name} is missing; export once more")
-    values = np.loadtxt(folder / name, delimiter=",", skiprows=1, ndmin=2)
-    if values.shape[1] != nu + ny or not 0 <= n < len(values):
-        raise ValueError(f"{name} has {values.shape[1]} columns and {len(values)} rows")
+    with (folder / name).open(encoding="utf-8", newline="") as stream:
+        _, *rows = csv.reader(stream)  # a name may hold commas and line ends
+    values = np.array(rows, dtype=np.float64)
+    if values.shape != (len(rows), nu + ny) or not 0 <= n < len(rows):
+        raise ValueError(f"{name} holds other columns, or no row to simulate")
     y = values[:, nu:]
     return CheckRecord(Path(name).stem, values[:, :nu], y[:n], y[n:], np.array(text["start"], dtype=np.float64))

@@ -25,7 +25,7 @@ def plain(text: str) -> str:
 
 def numbers(values: Iterable[float], indent: str = "    ") -> str:
     """Write numbers so that no bit is lost, several on a line."""
-    texts = [repr(float(value)) for value in np.asarray(values).ravel()]
+    texts = [repr(float(value)) for value in values]
     if len(texts) <= FEW:
         return ", ".join(texts)
     lines = [", ".join(texts[i : i + A_LINE]) for i in range(0, len(texts), A_LINE)]

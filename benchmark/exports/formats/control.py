@@ -71,7 +71,7 @@ def _linear(subject: Subject, polynomial: Any) -> str:
     matrices = []
     for name, matrix in zip("ABCD", polynomial.state_space, strict=True):
         rows, columns = matrix.shape
-        matrices.append(f"{name} = np.reshape([{numbers(matrix)}], ({rows}, {columns}))")
+        matrices.append(f"{name} = np.reshape([{numbers(matrix.ravel())}], ({rows}, {columns}))")
     inputs, outputs = variable_names(subject.fitted_on.channels)
     return LINEAR.format(
         heading=heading(subject), matrices="\n".join(matrices), u_mean=numbers(polynomial.u_mean),
