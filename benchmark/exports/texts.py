@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from simgap.exports.subjects import Subject
 from simgap.records import Channels
 
