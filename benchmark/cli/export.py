@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +18,20 @@ from simgap.cli.options import (
     parse_params,
     read_data,
 )
+from simgap.records import UnusableInput
+
+
+def _known(pairs: Sequence[str]) -> dict[str, float]:
+    """["inertia=0.1"] as {"inertia": 0.1}. Raises UnusableInput."""
+    known = parse_params(pairs)
+    for name, value in known.items():
+        if (
+            name not in ("inertia", "torque_constant")
+            or type(value) not in (int, float)
+            or not 0 < value < float("inf")
+        ):
+            raise UnusableInput(f"--plant {name}={value}: give inertia or torque_constant, a positive number")
+    return known
 
 
 def export(
@@ -26,6 +41,9 @@ def export(
     out: Annotated[Path | None, typer.Option(help="Write into this new folder.")] = None,
     check: Annotated[Path | None, typer.Option("--verify", help="Run the export in this folder once more.")] = None,
     experiment: Annotated[str | None, typer.Option(help="The experiment that becomes the record.")] = None,
+    plant: Annotated[
+        list[str] | None, typer.Option(help="inertia=VALUE or torque_constant=VALUE, for mjcf and urdf; repeatable.")
+    ] = None,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
@@ -37,7 +55,6 @@ def export(
 ) -> None:
     """Write a model as another simulator reads it, run it there, and say how far it is from our free run."""
     from simgap.exports import export as exports
-    from simgap.records import UnusableInput
     from simgap.reports.rendering import printable
 
     if check is not None:
@@ -50,13 +67,14 @@ def export(
             raise UnusableInput(
                 f"export needs MODEL DATA --to FORMAT --out DIR, FORMAT one of {formats}; or --verify DIR"
             )
+        known = _known(plant or ())
         exports.check_target(to, out)  # first, because a fit takes its time
         if exports.is_saved(model):
-            done = exports.export(model, data, to, out, experiment=experiment, dt=dt)
+            done = exports.export(model, data, to, out, experiment=experiment, dt=dt, plant=known)
         else:
             exports.check_model(model, to)
             dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
-            done = exports.export(model, dataset, to, out, parse_params(param or ()), seed, experiment)
+            done = exports.export(model, dataset, to, out, parse_params(param or ()), seed, experiment, plant=known)
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

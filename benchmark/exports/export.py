@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,18 +43,20 @@ class Verification:
 
 def export(
     model: str | Path | SavedModel, data: Any, to: str, out: str | Path, params: dict[str, Any] | None = None,
-    seed: int = 0, experiment: str | None = None, dt: float | None = None,
+    seed: int = 0, experiment: str | None = None, dt: float | None = None, plant: Mapping[str, float] | None = None,
 ) -> Verification:  # fmt: skip
     """Write a model as another simulator reads it, into a new folder, with records and their expected answers; run it.
 
     `model` is a saved model, or the name of one that is fitted first; `data` what it is fitted on, or records of the
-    same machine. The record is the first test experiment, or the one called `experiment`; dt in s, for files without a
-    column of time. Raises UnusableInput where the format does not take such a model, or what runs it is missing.
+    same machine; `plant` what is known of it, an inertia or a torque constant for mjcf and urdf. The record is the
+    first test experiment, or the one called `experiment`; dt in s, for files without a column of time. Raises
+    UnusableInput where the format does not take such a model, or what runs it is missing.
     """
     target, out = check_target(to, out), Path(out)
-    subject = _subject(model, data, to, params or {}, seed, experiment, dt)
+    subject = replace(_subject(model, data, to, params or {}, seed, experiment, dt), plant=dict(plant or {}))
+    limit = target.check(subject) if hasattr(target, "check") else subject.limit
     out.mkdir(parents=True, exist_ok=True)
-    write_folder(subject, to, out)
+    write_folder(subject, to, out, limit)
     target.write(subject, out)
     return verify(out)
 

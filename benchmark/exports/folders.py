@@ -31,7 +31,7 @@ class About:
     records: tuple[CheckRecord, ...]
 
 
-def write_folder(subject: Subject, form: str, folder: Path) -> None:
+def write_folder(subject: Subject, form: str, folder: Path, limit: float) -> None:
     """Write export.json and the records."""
     channels = subject.fitted_on.channels
     inputs, outputs = [c.name for c in channels.inputs], [c.name for c in channels.outputs]
@@ -47,7 +47,7 @@ def write_folder(subject: Subject, form: str, folder: Path) -> None:
     about: dict[str, Any] = {
         "schema": SCHEMA, "simgap": version("simgap"), "format": form, "model": subject.name,
         "fitted_on": subject.fitted_on.dataset, "dt": subject.fitted_on.dt, "inputs": inputs, "outputs": outputs,
-        "units": {c.name: c.unit for c in channels.inputs + channels.outputs}, "limit": subject.limit,
+        "units": {c.name: c.unit for c in channels.inputs + channels.outputs}, "limit": limit,
         "records": records,
     }  # fmt: skip
     (folder / ABOUT).write_text(json.dumps(about, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -62,6 +62,7 @@ class Subject:
     records: tuple[CheckRecord, ...]
     input_range: Float[np.ndarray, "2 nu"]  # the least and the largest value of each input
     output_range: Float[np.ndarray, "2 ny"]
+    plant: Mapping[str, float] = field(default_factory=dict)  # what is known of the machine: inertia, torque_constant
 
     @cached_property
     def form(self) -> StepForm:
