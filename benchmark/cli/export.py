@@ -44,6 +44,10 @@ def export(
     plant: Annotated[
         list[str] | None, typer.Option(help="inertia=VALUE or torque_constant=VALUE, for mjcf and urdf; repeatable.")
     ] = None,
+    into: Annotated[
+        Path | None, typer.Option(help="For mjcf: write a copy of this file with the joint in it too.")
+    ] = None,
+    joint: Annotated[str, typer.Option(help="With --into: the name of the joint in that file.")] = "",
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
@@ -68,13 +72,26 @@ def export(
                 f"export needs MODEL DATA --to FORMAT --out DIR, FORMAT one of {formats}; or --verify DIR"
             )
         known = _known(plant or ())
-        exports.check_target(to, out)  # first, because a fit takes its time
+        exports.check_target(to, out, into)  # first, because a fit takes its time
         if exports.is_saved(model):
-            done = exports.export(model, data, to, out, experiment=experiment, dt=dt, plant=known)
+            done = exports.export(
+                model, data, to, out, experiment=experiment, dt=dt, plant=known, into=into, joint=joint
+            )
         else:
             exports.check_model(model, to)
             dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
-            done = exports.export(model, dataset, to, out, parse_params(param or ()), seed, experiment, plant=known)
+            done = exports.export(
+                model,
+                dataset,
+                to,
+                out,
+                parse_params(param or ()),
+                seed,
+                experiment,
+                plant=known,
+                into=into,
+                joint=joint,
+            )
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

@@ -44,20 +44,25 @@ class Verification:
 def export(
     model: str | Path | SavedModel, data: Any, to: str, out: str | Path, params: dict[str, Any] | None = None,
     seed: int = 0, experiment: str | None = None, dt: float | None = None, plant: Mapping[str, float] | None = None,
+    into: str | Path | None = None, joint: str = "",
 ) -> Verification:  # fmt: skip
     """Write a model as another simulator reads it, into a new folder, with records and their expected answers; run it.
 
     `model` is a saved model, or the name of one that is fitted first; `data` what it is fitted on, or records of the
-    same machine; `plant` what is known of it, an inertia or a torque constant for mjcf and urdf. The record is the
+    same machine; `plant` what is known of it, an inertia or a torque constant for mjcf and urdf; `into` the user's own
+    MJCF, into a copy of which mjcf writes the joint of that name too. The record is the
     first test experiment, or the one called `experiment`; dt in s, for files without a column of time. Raises
     UnusableInput where the format does not take such a model, or what runs it is missing.
     """
-    target, out = check_target(to, out), Path(out)
+    target, out = check_target(to, out, into), Path(out)
     subject = replace(_subject(model, data, to, params or {}, seed, experiment, dt), plant=dict(plant or {}))
     limit = target.check(subject) if hasattr(target, "check") else subject.limit
+    files = {} if into is None else target.patch(subject, Path(into), joint)
     out.mkdir(parents=True, exist_ok=True)
     write_folder(subject, to, out, limit)
     target.write(subject, out)
+    for name, text in files.items():
+        (out / name).write_text(text, encoding="utf-8")
     return verify(out)
 
 
@@ -74,13 +79,15 @@ def verify(folder: str | Path) -> Verification:
     return Verification(about.format, differences, about.limit)
 
 
-def check_target(to: str, out: str | Path) -> Any:
+def check_target(to: str, out: str | Path, into: str | Path | None = None) -> Any:
     """Return the module of a format. Raises UnusableInput where what runs it is missing, or the folder is not new."""
     target, out = _format(to), Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise UnusableInput(f"{out} exists already; export into a new folder")
     if missing := target.missing():
         raise UnusableInput(f"--to {to}: {missing}")
+    if into is not None and not hasattr(target, "patch"):
+        raise UnusableInput(f"--into {into}: only --to mjcf writes into another file")
     return target
 
 

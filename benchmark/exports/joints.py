@@ -14,6 +14,7 @@ from simgap.exports.grey_boxes import GreyBoxStep
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.records import UnusableInput
+from simgap.registry import EFFECTS
 
 STANDARD_GRAVITY = 9.81  # m/s^2
 # Of the unit of a position, in rad or m; a velocity's is that per second.
@@ -230,3 +231,15 @@ def start_of(subject: Subject, joint: Joint, record: CheckRecord) -> JointStart:
     z: Float[np.ndarray, " n"] = now[writer.at : writer.at + writer.plant.order] * joint.scale
     position, velocity = (z[0], z[1]) if len(z) == 2 else (0.0, z[0])
     return JointStart(row, float(position), float(velocity), lags)
+
+
+def effects_table() -> list[str]:
+    """Write the table of the README: each effect in each of the two, or that this simulator cannot."""
+    lines = ["| effect | `mjcf` | `urdf` |", "|---|---|---|"]
+    for name in EFFECTS:
+        cells = [
+            f"{there[name][0]} = {there[name][1]} [{there[name][2]}]" if name in there else CANNOT
+            for there in (MJCF, URDF)
+        ]
+        lines.append(f"| `{name}` | {cells[0]} | {cells[1]} |")
+    return lines

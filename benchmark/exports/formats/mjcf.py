@@ -13,6 +13,7 @@ from simgap.exports import joint_runs, joints
 from simgap.exports.folders import About
 from simgap.exports.joint_runs import STIFF
 from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, body, joint_of
+from simgap.exports.patching import Robot, patched
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
 from simgap.records import UnusableInput
@@ -29,8 +30,8 @@ def check(subject: Subject) -> float:
 def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
     """The attributes of <joint> that the model gives, in SI units."""
     made = {
-        "damping": _numbers(joint.damping, joint.drag),
-        "stiffness": _numbers(joint.stiffness, *joint.stiffness_by_position),
+        "damping": _series(joint.damping, joint.drag),
+        "stiffness": _series(joint.stiffness, *joint.stiffness_by_position),
     }
     soft = f"{2 * step!r} 1"
     if joint.frictionloss:
@@ -59,6 +60,14 @@ def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
             actuator |= {"delay": repr(one["delay"]), "nsample": str(samples), "interp": "zoh"}
         made.append(actuator)
     return made
+
+
+def patch(subject: Subject, file: Path, name: str) -> dict[str, str]:
+    """Put the joint into the user's XML: the file and patch.diff, by their names. Raises UnusableInput."""
+    joint, robot = joint_of(subject, MJCF, "mjcf"), Robot.read(file, name)
+    made = joint_attributes(joint, robot.timestep), actuators(joint, name, robot.timestep)
+    text, diff = patched(robot, joint, *made)
+    return {f"{file.stem}_patched.xml": text, "patch.diff": diff}
 
 
 def write(subject: Subject, folder: Path) -> None:
@@ -96,5 +105,12 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
 
 
 def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _series(*values: float) -> str:
+    """Coefficients of a series without the zeros at its end, which older versions of MuJoCo do not read."""
     kept = list(values)
-    return " ".join(repr(float(value)) for value in kept)
+    while len(kept) > 1 and not kept[-1]:
+        kept.pop()
+    return _numbers(*kept)
