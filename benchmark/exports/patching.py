@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
+from simgap.exports.joint_runs import engine
 from simgap.exports.joints import Joint
 from simgap.records import UnusableInput
 
@@ -30,9 +33,7 @@ class Robot:
     @classmethod
     def read(cls, file: Path, joint: str) -> Robot:
         """Read the file. Raises UnusableInput where MuJoCo cannot, or where it has no such joint."""
-        import mujoco
-        import numpy as np
-
+        mujoco = engine()
         if not file.is_file():
             raise UnusableInput(f"--into {file}: there is no such file")
         try:

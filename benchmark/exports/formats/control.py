@@ -105,13 +105,15 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
     """Have python-control compute the response."""
     import control
 
+    respond: Any = control.input_output_response  # annotated for numbers, and takes arrays
+    respond_linearly: Any = control.forced_response
     module = imported(folder / FILE)
     u = record.u[record.n :]
     t = about.dt * np.arange(len(u))
     if hasattr(module, "U_MEAN"):
         ny = record.y_hat.shape[1]
         start = record.start[: len(record.start) - ny]
-        done = control.forced_response(module.SYSTEM, t, (u - module.U_MEAN).T, start, squeeze=False)
-        return done.outputs.T + module.Y_MEAN
-    done = control.input_output_response(module.SYSTEM, t, u.T, record.start, squeeze=False)
-    return done.outputs.T
+        done = respond_linearly(module.SYSTEM, t, (u - module.U_MEAN).T, start, squeeze=False)
+        return np.asarray(done.outputs).T + module.Y_MEAN
+    done = respond(module.SYSTEM, t, u.T, record.start, squeeze=False)
+    return np.asarray(done.outputs).T

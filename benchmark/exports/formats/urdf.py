@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from simgap.exports import joint_runs, joints
 from simgap.exports.folders import About
+from simgap.exports.joint_runs import engine
 from simgap.exports.joints import CANNOT, URDF, Joint, body, joint_of
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
@@ -62,13 +63,11 @@ def write(subject: Subject, folder: Path) -> None:
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:
     """Step MuJoCo, which reads URDF, through the record; the friction hardly gives way, and the step is ours."""
-    import mujoco
-
     if not (folder / FILE).is_file():
         raise UnusableInput(f"{folder / FILE} is missing; export once more")
     model, joint = joint_runs.load((folder / FILE).read_text(encoding="utf-8")), joint_runs.read_joint(folder)
     step = about.dt / joint["substeps"]
-    model.opt.timestep, model.opt.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.timestep, model.opt.integrator = step, engine().mjtIntegrator.mjINT_RK4
     impedance = [float(value) for value in joint_runs.STIFF.split()]
     model.dof_solref[:], model.dof_solimp[:] = (2 * step, 1.0), impedance
     model.jnt_solref[:], model.jnt_solimp[:] = (2 * step, 1.0), impedance
