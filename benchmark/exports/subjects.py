@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports.grey_boxes import GreyBoxStep
+from simgap.exports.rests import GreyBoxWithRest
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.simulation import Simulator
 from simgap.protocol import is_stochastic
@@ -81,6 +82,9 @@ def step_of(name: str, model: Any, about: FittedOn) -> tuple[StepForm, Any]:
     if isinstance(model, GreyBoxModel):
         grey = GreyBoxStep(model, nu, ny)
         return grey.form, grey.start
+    if callable(getattr(model, "grey_and_rest", None)):
+        whole = GreyBoxWithRest(*model.grey_and_rest(), nu, ny)
+        return whole.form, whole.start
     if not has_step(type(model)):
         raise UnusableInput(f"{name}: {NO_STEP}")
     return model.step_form(nu, ny), model.step_start
@@ -88,7 +92,8 @@ def step_of(name: str, model: Any, about: FittedOn) -> tuple[StepForm, Any]:
 
 def has_step(kind: type) -> bool:
     """Tell whether models of a class can be written as a step."""
-    return issubclass(kind, GreyBoxModel) or callable(getattr(kind, "step_form", None))
+    offers = (getattr(kind, name, None) for name in ("step_form", "grey_and_rest"))
+    return issubclass(kind, GreyBoxModel) or any(map(callable, offers))
 
 
 def refusal_of_step(kind: type) -> str:

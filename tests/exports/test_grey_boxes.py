@@ -4,7 +4,8 @@ import shutil
 
 import numpy as np
 import pytest
-from parameters_of_effects import scales, signal, values_of
+from parameters_of_effects import scales, values_of
+from plants_without_a_fit import DT, PLANTS, grey_box, record
 
 from simgap.exports.folders import About
 from simgap.exports.formats import c
@@ -12,40 +13,12 @@ from simgap.exports.grey_boxes import GreyBoxStep
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.noise import white
-from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.plant import Plant
 from simgap.records import Channels, UnusableInput
 from simgap.registry import EFFECTS
 from simgap.saved.archive import FittedOn
 
-DT = 0.1
 ABOUT = About("c", "greybox", DT, ("u",), ("y",), 1e-6, ())
-# kind, order, other fields of Plant, theta of the linear plant
-PLANTS = {
-    "velocity": ("velocity", 1, {}, [0.8, 1.5]),
-    "position": ("position", 2, {}, [1.1, 4.0, 6.0]),
-    "smooth input": ("position", 2, {"taps": (0, -1, 1), "zeros": 1}, [1.1, 4.0, 3.0, 1.0, 2.0, 0.02]),
-    "two outputs": ("position", 2, {"two_outputs": True}, [1.1, 4.0, 6.0, 0.9]),
-    "two masses": ("position", 4, {"joint": "load"}, [0.9, 1.0, 60.0, 80.0, 0.01, 6.0]),
-    "order 3": ("other", 3, {"offset": True, "zeros": 1}, [1.1, 4.0, 2.0, 9.0, 0.3, 0.05]),
-    "tanks": ("level", 2, {"offset": True}, [0.5, 0.8, 0.4, 0.3]),
-    "imposed": ("other", 0, {"offset": True}, [2.0, 0.1]),
-}
-
-
-def grey_box(name, terms=(), values=()):
-    """A model of one plant of PLANTS with these effects; its readings are those of the scales of the tests."""
-    kind, order, fields, linear = PLANTS[name]
-    seen = scales(kind, order)
-    plant = Plant(kind, order, 1, DT, scales=PlantScales((seen,), (seen, seen)), **fields).having(
-        [Term(term) for term in terms]
-    )
-    theta = np.zeros(plant.size)
-    theta[: plant.n_linear] = linear
-    for term, of_term in zip(terms, values, strict=True):
-        theta[plant.part_of(Term(term))] = of_term
-    state = {"plant": plant, "theta": theta, "noise": white(np.ones(plant.ny)), "outputs": tuple(range(plant.ny)),
-             "outliers": (), "usual": None}  # fmt: skip
-    return GreyBoxModel([FittedPlant.from_saved(state)])
 
 
 def differs(model, u, y_init, run=None):
@@ -56,14 +29,6 @@ def differs(model, u, y_init, run=None):
     y = (run or grey.form.run)(u[n:], start)
     record = CheckRecord("record", u, y_init, model.simulate(u[None], y_init[None])[0], start)
     return record.difference(y)
-
-
-def record(name):
-    level = name == "tanks"
-    u = signal(3)[:, None]
-    u = np.abs(u) if level else u
-    ny = 2 if name == "two outputs" else 1
-    return u, np.abs(np.random.default_rng(4).normal(size=(6, ny))) * (1.0 if level else 0.3)
 
 
 @pytest.mark.parametrize("name", PLANTS)
