@@ -73,9 +73,10 @@ def _linear(subject: Subject, polynomial: Any) -> str:
         rows, columns = matrix.shape
         matrices.append(f"{name} = np.reshape([{numbers(matrix.ravel())}], ({rows}, {columns}))")
     inputs, outputs = variable_names(subject.fitted_on.channels)
+    start = subject.records[0].start[: len(polynomial.state_space[0])]
     return LINEAR.format(
         heading=heading(subject), matrices="\n".join(matrices), u_mean=numbers(polynomial.u_mean),
-        y_mean=numbers(polynomial.y_mean), start=numbers(subject.records[0].start), dt=subject.fitted_on.dt,
+        y_mean=numbers(polynomial.y_mean), start=numbers(start), dt=subject.fitted_on.dt,
         inputs=inputs, outputs=outputs,
     )  # fmt: skip
 
@@ -111,8 +112,7 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
     u = record.u[record.n :]
     t = about.dt * np.arange(len(u))
     if hasattr(module, "U_MEAN"):
-        ny = record.y_hat.shape[1]
-        start = record.start[: len(record.start) - ny]
+        start = record.start[: module.SYSTEM.nstates]
         done = respond_linearly(module.SYSTEM, t, (u - module.U_MEAN).T, start, squeeze=False)
         return np.asarray(done.outputs).T + module.Y_MEAN
     done = respond(module.SYSTEM, t, u.T, record.start, squeeze=False)
