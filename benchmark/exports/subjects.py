@@ -83,7 +83,8 @@ def step_of(name: str, model: Any, about: FittedOn) -> tuple[StepForm, Any]:
         grey = GreyBoxStep(model, nu, ny)
         return grey.form, grey.start
     if callable(getattr(model, "grey_and_rest", None)):
-        whole = GreyBoxWithRest(*model.grey_and_rest(), nu, ny)
+        inner, rest = model.grey_and_rest()
+        whole = GreyBoxWithRest(inner, rest, nu, ny)
         return whole.form, whole.start
     if not has_step(type(model)):
         raise UnusableInput(f"{name}: {NO_STEP}")
