@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from simgap.baselines.estimation.stepping import constant
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
+from simgap.step_form import StepForm
 
 
 @MODELS.register("hold")
@@ -25,3 +27,11 @@ class Hold:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         return np.repeat(y_init[:, -1:], u.shape[1] - y_init.shape[1], axis=1)
+
+    def step_form(self, nu: int, ny: int) -> StepForm:
+        """Write the model as a step, for exports; at rest, it stands at zero."""
+        return constant(np.zeros(ny), nu)
+
+    def step_start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
+        """Return the state of that step before sample n."""
+        return y_init[-1]

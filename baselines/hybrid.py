@@ -11,6 +11,7 @@ from jaxtyping import Float
 from simgap.baselines.estimation import filter_network
 from simgap.baselines.estimation.filter_network import FilterNetwork
 from simgap.baselines.greybox_auto import GreyBoxAuto
+from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.rest import MATTERS, Rest, RestOfOutput, learn, simulated
 from simgap.greybox.rest_features import Design, Features
 from simgap.records import TrainingSet
@@ -63,6 +64,10 @@ class Hybrid:
         """Simulate with the grey box from the state found in the n measured samples, and add the learnt rest."""
         y_hat = self.grey.simulate_whole(u, y_init)
         return (y_hat + self.rest.predict(u, y_hat))[:, y_init.shape[1] :]
+
+    def grey_and_rest(self) -> tuple[GreyBoxModel, Rest]:
+        """Return the two whose outputs are added, for exports."""
+        return self.grey, self.rest
 
     @property
     def n_params(self) -> int:

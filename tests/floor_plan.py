@@ -6,7 +6,7 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
            "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
 
-GROUND = {"records", "protocol", "registry"}
+GROUND = {"records", "protocol", "registry", "step_form"}
 RUN = {"metrics", "tasks", "results", "running"}
 # Room or module -> what it may import besides itself. "simgap" is the lazy exports of the package.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -14,6 +14,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "findings": {"records"},
     "wording": set(),
     "protocol": {"records"},
+    "step_form": {"records"},
     "registry": {"records"},
     "metrics": {"records"},
     "tasks": {"records", "metrics"},
@@ -25,12 +26,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "baselines": GROUND | {"data", "greybox"},
     "neural": GROUND | {"data"},
     "saved": GROUND | RUN | {"data"},
+    "exports": GROUND | RUN | {"data", "greybox", "saved"},
     "contract": GROUND | RUN | {"data", "saved"},
     "reports": {"records", "metrics", "results", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "data", "greybox", "error_views", "reports"},
-    "simgap": GROUND | RUN | {"data", "diagnosis", "reports", "saved"},
-    "cli": GROUND | RUN | {"contract", "findings", "data", "greybox", "diagnosis", "reports", "saved", "simgap"},
+    "simgap": GROUND | RUN | {"data", "diagnosis", "exports", "reports", "saved"},
+    "cli": GROUND
+    | RUN
+    | {"contract", "exports", "findings", "data", "greybox", "diagnosis", "reports", "saved", "simgap"},
 }
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from jaxtyping import Float
 
+from simgap.baselines.estimation import graph, stepping
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import TooFewSamples
 from simgap.baselines.estimation.fitted import LinearFit, Row
@@ -17,6 +18,7 @@ from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
 from simgap.records import Channels, Experiment, TrainingSet, UnusableInput
+from simgap.step_form import StepForm
 
 if TYPE_CHECKING:
     import control
@@ -93,6 +95,18 @@ class LinearModel(ABC):
     def to_control(self) -> control.StateSpace:
         """Convert to python-control, for deviations from its operating point; see `Polynomial.to_control`."""
         return self.polynomial.to_control()
+
+    def step_form(self, nu: int, ny: int) -> StepForm:
+        """Write the model as a step, for exports."""
+        return stepping.step_form(self.polynomial)
+
+    def step_start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
+        """Return the state of that step before sample n."""
+        return stepping.start(self.polynomial, u, y_init)
+
+    def to_onnx(self, n: int) -> Any:
+        """Convert to an ONNX graph that simulates as `simulate` does, from n measured samples."""
+        return graph.build(self.polynomial, n)
 
     def summary(self) -> str:
         """Describe the coefficients with standard errors, the poles, and the residual analysis.

@@ -45,7 +45,7 @@ class Polynomial:
         """Run free from the state that the first n samples show; no measured output is used after them."""
         n = y_init.shape[1]
         u = u - self.u_mean
-        state = self._state_after(u[:, :n], y_init - self.y_mean)
+        state = self.state_after(u[:, :n], y_init - self.y_mean)
         y = _run(self.a, self.b, u[:, n:], state)
         y += self.y_mean
         return y
@@ -107,7 +107,7 @@ class Polynomial:
         nothing = np.zeros((size, n, self._predictor.shape[2]))
         return _run(self.c, self._predictor[:1], nothing, unit).reshape(size, n * ny).T
 
-    def _state_after(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def state_after(self, u: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Compute z [B, N, ny] at t = n, after the predictor has followed the n measured samples."""
         n, start = y.shape[1], self._start_state(u, y)
         signals = np.concatenate((u, y, self._follow(u, y, start)), axis=2)

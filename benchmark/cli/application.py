@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import check, data, diagnose, fit, new_model, range_test, report, run, simulate, try_model
+from simgap.cli import check, data, diagnose, export, fit, new_model, range_test, report, run, simulate, try_model
 from simgap.cli import list as catalogue
 from simgap.records import UnusableInput
 
@@ -20,6 +20,7 @@ app.command("list")(catalogue.show)
 app.command("diagnose")(diagnose.diagnose)
 app.command("fit")(fit.fit)
 app.command("simulate")(simulate.simulate)
+app.command("export")(export.export)
 app.command("range-test")(range_test.range_test)
 app.command("check")(check.check)
 app.command("new-model")(new_model.new_model)

@@ -78,7 +78,7 @@ class FittedPlant:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T ny"]:
         """Simulate all rows from that initial state, those of the measured samples too."""
-        return Simulator(self.forecasting, u).run(self.estimate.theta, self._start(u, y_init))
+        return Simulator(self.forecasting, u).run(self.estimate.theta, self.start(u, y_init))
 
     def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
         """Simulate the training records from the initial states that suit all of each best."""
@@ -86,7 +86,7 @@ class FittedPlant:
         theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
         return Simulator(plant, self.records.u).run(theta, local)
 
-    def _start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
+    def start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
         """Find the initial states: from the first n samples, and from where the training records start."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
         beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
@@ -100,7 +100,7 @@ class FittedPlant:
         plant, theta = self.forecasting, self.estimate.theta
         if not plant.terms:
             return np.zeros((*u.shape[:2], 0))
-        start = self._start(u, y_init)
+        start = self.start(u, y_init)
         whole = Simulator(plant, u).run(theta, start)
         contributions = []
         for term in plant.terms:

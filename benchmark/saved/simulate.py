@@ -19,7 +19,7 @@ from simgap.data.loading import read_recordings
 from simgap.metrics import score_outputs
 from simgap.records import Channel, Channels, Experiment, UnusableInput, same_sampling_time
 from simgap.running.fitting import CheckedSimulation
-from simgap.saved.archive import SavedModel, read_saved
+from simgap.saved.archive import FittedOn, SavedModel, read_saved
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +65,21 @@ def simulate(
     UnusableInput where columns, units or sampling time are not those that the model was fitted on.
     """
     saved = saved if isinstance(saved, SavedModel) else read_saved(saved)
-    about = saved.fitted_on
+    return [_simulated(saved, x) for x in matching_experiments(saved.fitted_on, data, experiment, dt)]
+
+
+def matching_experiments(
+    about: FittedOn, data: Any, experiment: str | None = None, dt: float | None = None
+) -> list[Experiment]:
+    """Read the records that `simulate` takes, for a model that was fitted on such data. Raises UnusableInput."""
     recordings = read_recordings(data, about.channels, dt)
     source = os.fspath(data) if isinstance(data, str | os.PathLike) else "the data"
     for role in ("inputs", "outputs"):
         _check_columns(source, role, getattr(recordings.channels, role), getattr(about.channels, role))
     chosen = _chosen(source, recordings.experiments, recordings.others, experiment)
-    return [_simulated(saved, source, x) for x in chosen]
+    for x in chosen:
+        _check_samples(about, source, x)
+    return list(chosen)
 
 
 def _check_columns(source: str, role: str, given: tuple[Channel, ...], fitted: tuple[Channel, ...]) -> None:
@@ -101,8 +109,7 @@ def _chosen(
     raise UnusableInput(f"{source}: there is no experiment {name!r}; there are {there}")
 
 
-def _simulated(saved: SavedModel, source: str, x: Experiment) -> Simulation:
-    about = saved.fitted_on
+def _check_samples(about: FittedOn, source: str, x: Experiment) -> None:
     if not same_sampling_time(x.dt, about.dt):
         raise UnusableInput(
             f"{source}: {x.name} is sampled every {x.dt:g} s, the model was fitted on {about.dt:g} s; resample the data"
@@ -112,6 +119,10 @@ def _simulated(saved: SavedModel, source: str, x: Experiment) -> Simulation:
             f"{source}: {x.name} has {len(x)} samples, of which n_init = {about.n_init} start the simulation; "
             f"nothing is left to simulate"
         )
+
+
+def _simulated(saved: SavedModel, x: Experiment) -> Simulation:
+    about = saved.fitted_on
     run = CheckedSimulation(saved.model, len(about.channels.outputs))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # an overflow shows in the figures

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from simgap.neural.training import checkpoints, sequences, weights, windows
+from simgap.neural.training import checkpoints, graph, sequences, stepping, weights, windows
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
 from simgap.neural.training.loop import History, Recipe, figures, range_test, train
@@ -22,6 +22,7 @@ from simgap.neural.training.scaling import Scaling, features, scalings
 from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
 from simgap.records import TrainingSet, UnusableInput
+from simgap.step_form import StepForm
 
 WINDOWED = Recipe(epochs=30, batch=32, learning_rate=1e-4, patience=1, early_stop=10)
 STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=40)
@@ -163,6 +164,18 @@ class Network(ABC):
     def from_saved(cls, state: dict[str, Any]) -> Any:
         """Build the network that `saved_state` describes. Raises UnusableInput, ValueError, TypeError, RuntimeError."""
         return weights.build(cls, state)
+
+    def step_form(self, nu: int, ny: int) -> StepForm:
+        """Write the network as a step, for exports. Raises UnusableInput for parts that have none."""
+        return stepping.step_form(self, nu, ny)
+
+    def step_start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
+        """Return the state of that step before sample n."""
+        return stepping.start(self, u, y_init)
+
+    def to_onnx(self, n: int) -> Any:
+        """Convert to an ONNX graph that simulates as `simulate` does, from any number of measured samples."""
+        return graph.build(self)
 
     def hyper_parameters(self) -> dict[str, Any]:
         """Give the fields that a user may choose."""

@@ -55,3 +55,8 @@ class AbsoluteSensor(OutputEffect):
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return |y|."""
         return np.abs(y)
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        return abs(y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
@@ -25,6 +26,19 @@ def lagged(u: np.ndarray, time_constant: float, h: float) -> np.ndarray:
     return u + (before - u) * (-math.expm1(-ratio) / ratio)
 
 
+def lagged_step(u, time_constant, m, j, h, k):
+    """Return the same, substep by substep; m[j] is where the lag stands."""
+    if k == 0:
+        m[j] = u
+    if time_constant <= 1e-3 * h:
+        m[j] = u
+        return u
+    ratio = h / time_constant
+    before = m[j]
+    m[j] = u + (before - u) * math.exp(-ratio)
+    return u + (before - u) * (-math.expm1(-ratio) / ratio)
+
+
 @EFFECTS.register("actuator_lag")
 @final
 class ActuatorLag(InputEffect):
@@ -38,6 +52,7 @@ class ActuatorLag(InputEffect):
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
     place_in_chain: ClassVar[int] = 70
+    helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     linear: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
@@ -77,3 +92,13 @@ class ActuatorLag(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Delay u by a first-order lag of p[0] seconds."""
         return lagged(u, float(p[0]), h)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return lagged_step(u, p[i], m, j, h, k)
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 1

@@ -59,3 +59,8 @@ class AsymmetricGain(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u + p[0] |u|: positive values grow by the share p[0], negative ones shrink by it."""
         return u + p[0] * np.abs(u)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return u + p[i] * abs(u)

@@ -70,3 +70,16 @@ class Backlash(InputEffect):
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
         """Return u behind a gap in which each record begins at -1 (one side) to 1 (the other)."""
         return behind_gap(u, p[0], u[:, 0] + 0.5 * p[0] * start)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        if k == 0:
+            m[j] = u + 0.5 * p[i] * m[j]
+        m[j] = min(max(m[j], u - 0.5 * p[i]), u + 0.5 * p[i])
+        return m[j]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 1

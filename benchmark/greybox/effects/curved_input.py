@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
@@ -48,6 +49,23 @@ def curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
     return rest + half * (curve((x - middle) / half) - curve((rest - middle) / half))
 
 
+def bent(z, ends, tilt):
+    """Return the characteristic at z, the place in the range from -1 to 1."""
+    inside = min(max(z, -1.0), 1.0)
+    size = abs(inside)
+    slope = 1 + ends * (2 * size - 1) + tilt * inside
+    return inside * (1 + ends * (size - 1)) + 0.5 * tilt * inside * inside + slope * (z - inside)
+
+
+def curved_step(x, p, i):
+    """Return the same as `curved`, for one number."""
+    ends = p[i]
+    tilt = p[i + 1] * (1 + ends)
+    rest = min(max(0.0, p[i + 2] - p[i + 3]), p[i + 2] + p[i + 3])
+    change = bent((x - p[i + 2]) / p[i + 3], ends, tilt) - bent((rest - p[i + 2]) / p[i + 3], ends, tilt)
+    return rest + p[i + 3] * change
+
+
 def gains_in_words(values: dict[str, float]) -> str:
     """Compare the gains at the ends with that in the middle."""
     ends, tilt, *_ = values.values()
@@ -72,6 +90,7 @@ class CurvedInput(InputEffect):
         "model, IEEE Trans. Automatic Control 11, 1966, eq. 1"
     )
     place_in_chain: ClassVar[int] = 45
+    helpers: ClassVar[tuple[Callable[..., float], ...]] = (bent, curved_step)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "dead_zone": (
@@ -123,3 +142,8 @@ class CurvedInput(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u on its characteristic."""
         return curved(u, p)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return curved_step(u, p, i)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
 
 from simgap.findings import ViewName
-from simgap.greybox.effects.curved_input import curved, gains_in_words, parameters_of_curve, starts_of_curve
+from simgap.greybox.effects.curved_input import (
+    bent,
+    curved,
+    curved_step,
+    gains_in_words,
+    parameters_of_curve,
+    starts_of_curve,
+)
 from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -27,6 +35,7 @@ class CurvedSensor(OutputEffect):
         "Wigren, Recursive prediction error identification using the nonlinear Wiener model, Automatica 29, 1993, eq. 2"
     )
     place_in_chain: ClassVar[int] = 115
+    helpers: ClassVar[tuple[Callable[..., float], ...]] = (bent, curved_step)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_saturation": (
@@ -71,3 +80,8 @@ class CurvedSensor(OutputEffect):
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return y on its characteristic."""
         return curved(y, p)
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        return curved_step(y, p, i)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, final
 
 import numpy as np
@@ -54,3 +55,8 @@ class DeadZone(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u shrunk towards zero by p[0]."""
         return np.sign(u) * np.maximum(np.abs(u) - p[0], 0.0)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return math.copysign(max(abs(u) - p[i], 0.0), u)

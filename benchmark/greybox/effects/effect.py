@@ -146,6 +146,9 @@ class Effect(ABC):
     # A reading does not tell on which side of zero the quantity is.
     hides_sign: ClassVar[bool] = False
 
+    # Functions that the term, or the step, calls.
+    helpers: ClassVar[tuple[Callable[..., float], ...]] = ()
+
     @abstractmethod
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """List the parameters, with bounds in proportion to the signals."""
@@ -178,6 +181,16 @@ class InputEffect(Effect):
         """Return the same for records that start with this in memory, 0 in the middle; for terms that have any."""
         raise NotImplementedError
 
+    # For exports, the term for one number after the other, step(u, p, i, m, j, h, k) with k = 0 at the first: its
+    # parameters are p[i], p[i + 1], ..., what it keeps m[j], ..., where m[j] begins as the start of `term_from`. A step
+    # form, see simgap.step_form.
+    step: ClassVar[Callable[..., float]]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 0
+
 
 class ForceEffect(Effect):
     """An effect that acts on the plant together with the input."""
@@ -198,6 +211,14 @@ class OutputEffect(Effect):
     @abstractmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return the reading of y [E, T] at the times t [T] in s."""
+
+    # The same for one number after the other, as that of an InputEffect; not for what belongs to one experiment.
+    step: ClassVar[Callable[..., float]]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 0
 
 
 # Kinds of outputs that tell a motion.

@@ -41,3 +41,8 @@ class GainFade(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u (1 - p[0] t), with t at the middle of each step."""
         return u * (1 - p[0] * h * (np.arange(u.shape[1]) + 0.5))
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return u * (1 - p[i] * h * (k + 0.5))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
 
 from simgap.findings import ViewName
-from simgap.greybox.effects.actuator_lag import lagged
+from simgap.greybox.effects.actuator_lag import lagged, lagged_step
 from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
@@ -28,6 +29,7 @@ class InnerSaturation(InputEffect):
         "fig. 1 (two filters with a diode between them)"
     )
     place_in_chain: ClassVar[int] = 75
+    helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     substeps: ClassVar[int] = 4
     contains: ClassVar[tuple[str, ...]] = ("actuator_lag", "input_saturation")
     shows_in: ClassVar[tuple[ViewName, ...]] = ("amplitude", "input", "frequency band")
@@ -69,3 +71,13 @@ class InnerSaturation(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u behind a lag of p[0] seconds, clipped to p[1] .. p[2]."""
         return np.clip(lagged(u, float(p[0]), h), p[1], max(p[1], p[2]))
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return min(max(lagged_step(u, p[i], m, j, h, k), p[i + 1]), max(p[i + 1], p[i + 2]))
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 1

@@ -50,3 +50,21 @@ class InputDelay(InputEffect):
         steps = min(int(whole), u.shape[1] - 1)
         padded = np.concatenate((np.repeat(u[:, :1], steps + 1, axis=1), u), axis=1)
         return (1 - part) * padded[:, 1 : 1 + u.shape[1]] + part * padded[:, : u.shape[1]]
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        late = max(p[i], 0.0) / h
+        steps = int(late)
+        size = steps + 2  # of the ring of past values
+        if k == 0:
+            for at in range(size):
+                m[j + at] = u
+        m[j + k % size] = u
+        part = late - steps
+        return (1 - part) * m[j + (k + 2) % size] + part * m[j + (k + 1) % size]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return int(max(p[0], 0.0) / h) + 2

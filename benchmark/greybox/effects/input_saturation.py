@@ -50,3 +50,8 @@ class InputSaturation(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u clipped to -p[0] .. p[0]."""
         return np.clip(u, -p[0], p[0])
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return min(max(u, -p[i]), p[i])

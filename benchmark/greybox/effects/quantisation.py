@@ -39,3 +39,8 @@ class Quantisation(OutputEffect):
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Round y to the nearest multiple of p[0]."""
         return p[0] * np.round(y / p[0])
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        return p[i] * round(y / p[i])

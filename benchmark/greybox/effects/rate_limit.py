@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, final
 
 import numpy as np
@@ -84,3 +85,21 @@ class RateLimit(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return the mean over each step of h seconds of u at limited speeds; it begins at the first value of u."""
         return limited_rate(u, p[0] * h, p[1] * h)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        if k == 0:
+            m[j] = u
+        way = u - m[j]
+        speed = p[i] * h if way > 0.0 else p[i + 1] * h
+        if abs(way) > speed:
+            m[j] += math.copysign(speed, way)
+            return m[j] - 0.5 * math.copysign(speed, way)
+        m[j] = u
+        return u - (0.5 * way * abs(way) / speed if speed > 0.0 else 0.0)
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, final
 
 import numpy as np
@@ -49,3 +50,24 @@ class SensorLag(OutputEffect):
         now = 1 - (1 - decay) / ratio  # weight of the new sample; the old one has the rest
         reading, _ = lfilter([now, 1 - decay - now], [1.0, -decay], y, axis=1, zi=(1 - now) * y[:, :1])
         return reading
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        if k == 0:
+            m[j] = y
+            m[j + 1] = y
+        if p[i] > 1e-3 * h:
+            ratio = h / p[i]
+            decay = math.exp(-ratio)
+            now = 1 - (1 - decay) / ratio
+            m[j + 1] = now * y + (1 - decay - now) * m[j] + decay * m[j + 1]
+        else:
+            m[j + 1] = y
+        m[j] = y
+        return m[j + 1]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 2

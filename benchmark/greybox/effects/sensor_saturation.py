@@ -67,3 +67,8 @@ class SensorSaturation(OutputEffect):
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return y clipped to p[0] .. p[1]."""
         return np.clip(y, p[0], max(p[0], p[1]))
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        return min(max(y, p[i]), max(p[i], p[i + 1]))

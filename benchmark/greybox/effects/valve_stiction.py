@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, final
 
 import numpy as np
@@ -97,3 +98,34 @@ class ValveStiction(InputEffect):
         """Return the position of a stem that stands somewhere, from the command before."""
         low, high = 0.5 * p[0] * (1 - p[1]), 0.5 * p[0] * (1 + p[1])
         return stem(u, low, high, max(1, round(p[2] / h)), at, before)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep; it keeps stem, direction, last command, and what is shown."""
+        low = 0.5 * p[i] * (1 - p[i + 1])
+        high = 0.5 * p[i] * (1 + p[i + 1])
+        if k == 0:
+            m[j] = u + high * m[j]
+            m[j + 1] = 0.0
+            m[j + 2] = u
+        if k % int(max(1.0, round(p[i + 2] / h))) == 0:
+            change = u - m[j + 2]
+            away = u - m[j]
+            m[j + 2] = u
+            if change * m[j + 1] > 0.0:
+                m[j] = u - math.copysign(low, m[j + 1])
+                m[j + 3] = m[j]
+            else:
+                near = max(min(abs(change), 0.3 * (high - low)), 1e-300)  # SOFT
+                share = min(max(0.5 + (abs(away) - high) / near, 0.0), 1.0)
+                side = math.copysign(1.0, away)
+                m[j + 3] = m[j] + share * (away - side * low)
+                m[j + 1] = side if share >= 0.5 else 0.0
+                if share >= 0.5:
+                    m[j] = u - side * low
+        return m[j + 3]
+
+    @staticmethod
+    def cells(p: np.ndarray, h: float) -> int:
+        """Return how many numbers the step keeps."""
+        return 4

@@ -1,0 +1,1 @@
+"""Fitted models for other people's simulators, each with a record and the answer that is expected of it."""

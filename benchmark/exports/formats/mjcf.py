@@ -1,0 +1,116 @@
+"""`mjcf`: model.xml, one joint of MuJoCo with its actuators; or these in the user's own XML, with a diff."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.exports import joint_runs, joints
+from simgap.exports.folders import About
+from simgap.exports.joint_runs import STIFF
+from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, body, joint_of
+from simgap.exports.patching import Robot, patched
+from simgap.exports.subjects import CheckRecord, Subject
+from simgap.exports.texts import heading
+from simgap.records import UnusableInput
+
+FILE = "model.xml"
+refusal, missing = joints.refusal, joint_runs.missing
+
+
+def check(subject: Subject) -> float:
+    """Return the limit of the difference. Raises UnusableInput for what MuJoCo cannot hold."""
+    return joint_runs.limit(joint_of(subject, MJCF, "mjcf"))
+
+
+def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
+    """The attributes of <joint> that the model gives, in SI units."""
+    made = {
+        "damping": _series(joint.damping, joint.drag),
+        "stiffness": _series(joint.stiffness, *joint.stiffness_by_position),
+    }
+    soft = f"{2 * step!r} 1"
+    if joint.frictionloss:
+        made |= {"frictionloss": repr(joint.frictionloss), "solimpfriction": STIFF, "solreffriction": soft}
+    if joint.limits:
+        made |= {"limited": "true", "range": _numbers(*joint.limits), "solimplimit": STIFF, "solreflimit": soft}
+    return made
+
+
+def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
+    """The attributes of <general>, one for each input; a constant load goes with the first one."""
+    made = []
+    for i, (gain, one) in enumerate(zip(joint.gains, joint.inputs, strict=True)):
+        bias = joint.bias if i == 0 else 0.0
+        actuator = {"name": f"{name}_input{i}", "joint": name, "gainprm": repr(gain)}
+        if bias:
+            actuator |= {"biastype": "affine", "biasprm": _numbers(bias, 0.0, 0.0)}
+        if "clip" in one:
+            actuator |= {"ctrllimited": "true", "ctrlrange": _numbers(*one["clip"])}
+        if one.get("lag", 0.0) > 0:
+            actuator |= {"dyntype": "filter", "dynprm": repr(one["lag"])}
+        if "reach" in one:
+            actuator |= {"forcelimited": "true", "forcerange": _numbers(*(end + bias for end in one["reach"]))}
+        if one.get("delay", 0.0) > 0:
+            samples = math.ceil(one["delay"] / step) + 2
+            actuator |= {"delay": repr(one["delay"]), "nsample": str(samples), "interp": "zoh"}
+        made.append(actuator)
+    return made
+
+
+def patch(subject: Subject, file: Path, name: str) -> dict[str, str]:
+    """Put the joint into the user's XML: the file and patch.diff, by their names. Raises UnusableInput."""
+    joint, robot = joint_of(subject, MJCF, "mjcf"), Robot.read(file, name)
+    made = joint_attributes(joint, robot.timestep), actuators(joint, name, robot.timestep)
+    text, diff = patched(robot, joint, *made)
+    return {f"{file.stem}_patched.xml": text, "patch.diff": diff}
+
+
+def write(subject: Subject, folder: Path) -> None:
+    """Write model.xml and joint.json."""
+    joint = joint_of(subject, MJCF, "mjcf")
+    step = joint_runs.timestep(subject, joint)
+    root = ET.Element("mujoco", model=subject.name)
+    root.append(ET.Comment(f" {heading(subject).replace('--', '-')} "))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="false")
+    option = ET.SubElement(
+        root, "option", timestep=repr(step), integrator="RK4", gravity=_numbers(0.0, 0.0, -STANDARD_GRAVITY),
+        tolerance="1e-12", iterations="200",
+    )  # fmt: skip
+    ET.SubElement(option, "flag", contact="disable")
+    mass, centre, about_centre = body(joint)
+    link = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="link")
+    moments = _numbers(*[about_centre if joint.kind == "hinge" else mass] * 3)
+    ET.SubElement(link, "inertial", mass=repr(mass), pos=_numbers(*centre), diaginertia=moments)
+    axis = "0 1 0" if joint.kind == "hinge" else "1 0 0"
+    ET.SubElement(link, "joint", {"name": "joint", "type": joint.kind, "axis": axis} | joint_attributes(joint, step))
+    section = ET.SubElement(root, "actuator")
+    for actuator in actuators(joint, "joint", step):
+        ET.SubElement(section, "general", actuator)
+    ET.indent(root)
+    (folder / FILE).write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    joint_runs.write_joint(subject, joint, folder)
+
+
+def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:
+    """Step MuJoCo through the record."""
+    if not (folder / FILE).is_file():
+        raise UnusableInput(f"{folder / FILE} is missing; export once more")
+    model = joint_runs.load((folder / FILE).read_text(encoding="utf-8"))
+    return joint_runs.run(model, joint_runs.read_joint(folder), about, record, effort=False)
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _series(*values: float) -> str:
+    """Coefficients of a series without the zeros at its end, which older versions of MuJoCo do not read."""
+    kept = list(values)
+    while len(kept) > 1 and not kept[-1]:
+        kept.pop()
+    return _numbers(*kept)

@@ -1,0 +1,141 @@
+"""A joint and its actuators in the user's own MJCF: only their tags change, and a diff says how."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from simgap.exports.joint_runs import engine
+from simgap.exports.joints import Joint
+from simgap.records import UnusableInput
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The user's file as text, and what MuJoCo makes of it at the joint that is meant."""
+
+    file: Path
+    text: str
+    joint: str
+    inertia: float  # that the bodies bring to the joint, with the others at rest
+    kind: str
+    timestep: float
+    in_degrees: bool
+
+    @classmethod
+    def read(cls, file: Path, joint: str) -> Robot:
+        """Read the file. Raises UnusableInput where MuJoCo cannot, or where it has no such joint."""
+        mujoco = engine()
+        if not file.is_file():
+            raise UnusableInput(f"--into {file}: there is no such file")
+        try:
+            model = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError as error:
+            raise UnusableInput(f"--into {file}: MuJoCo cannot read it: {' '.join(str(error).split())}") from error
+        names: list[str] = [model.joint(i).name for i in range(model.njnt)]
+        kinds = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+        simple = [name for i, name in enumerate(names) if name and int(model.jnt_type[i]) in kinds]
+        if joint not in simple:
+            raise UnusableInput(
+                f"--joint {joint}: {file} has no such hinge or slide; it has {', '.join(simple) or 'none'}"
+            )
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        masses = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, masses)
+        i = names.index(joint)
+        dof = int(model.jnt_dofadr[i])
+        text = file.read_text(encoding="utf-8")
+        radians = re.search(r"<compiler\b[^>]*\bangle\s*=\s*[\"']radian", _without_comments(text))
+        inertia = float(masses[dof, dof] - model.dof_armature[dof])
+        return cls(
+            file, text, joint, inertia, kinds[int(model.jnt_type[i])], float(model.opt.timestep), radians is None
+        )
+
+
+def patched(
+    robot: Robot, joint: Joint, attributes: Mapping[str, str], actuators: Sequence[Mapping[str, str]]
+) -> tuple[str, str]:
+    """Return the patched text and a unified diff; the armature makes up what the bodies lack of the inertia.
+
+    Raises UnusableInput where the joint is of another kind, its bodies are too heavy, or their gravity is their own.
+    """
+    if joint.kind != robot.kind:
+        raise UnusableInput(f"--joint {robot.joint} is a {robot.kind}, the model is one of a {joint.kind}")
+    if joint.swing:
+        raise UnusableInput("--into: the model has gravity of its own, which the bodies in the file bring already")
+    armature = joint.inertia - robot.inertia
+    if armature < 0:
+        raise UnusableInput(
+            f"the bodies at {robot.joint} have {robot.inertia:.4g} kg m^2 or kg, more than the {joint.inertia:.4g} of "
+            f"the model; correct them or --plant"
+        )
+    made = {**attributes, "armature": repr(armature)}
+    if joint.limits and robot.in_degrees and joint.kind == "hinge":
+        made["range"] = " ".join(repr(degrees(end)) for end in joint.limits)
+    text = _edited(robot, made)
+    text = _with_actuators(robot, text, actuators)
+    names = str(robot.file), f"{robot.file.stem}_patched.xml"
+    diff = difflib.unified_diff(robot.text.splitlines(True), text.splitlines(True), *names)
+    return text, "".join(diff)
+
+
+def _without_comments(text: str) -> str:
+    """Blank the comments, so that places stay."""
+    return re.sub(r"<!--.*?-->", lambda match: " " * len(match[0]), text, flags=re.DOTALL)
+
+
+def _tags(text: str, name: str, attribute: str, value: str) -> list[re.Match[str]]:
+    found = re.finditer(rf"<{name}\b[^>]*>", _without_comments(text))
+    wanted = re.compile(rf"\s{attribute}\s*=\s*([\"']){re.escape(value)}\1")
+    return [match for match in found if wanted.search(match[0])]
+
+
+def _edited(robot: Robot, attributes: Mapping[str, str]) -> str:
+    places = _tags(robot.text, "(?:joint|freejoint)", "name", robot.joint)
+    if len(places) != 1:
+        raise UnusableInput(
+            f"--joint {robot.joint}: its tag is not in {robot.file} itself, but in a file that it includes"
+        )
+    tag = robot.text[places[0].start() : places[0].end()]
+    for name, value in attributes.items():
+        written, count = re.subn(rf"(\s){name}\s*=\s*(\"[^\"]*\"|'[^']*')", rf'\g<1>{name}="{value}"', tag)
+        tag = written if count else re.sub(r"\s*(/?>)$", rf' {name}="{value}"\1', tag)
+    return robot.text[: places[0].start()] + tag + robot.text[places[0].end() :]
+
+
+def _with_actuators(robot: Robot, text: str, actuators: Sequence[Mapping[str, str]]) -> str:
+    there = _tags(
+        text, r"(?:general|motor|position|velocity|intvelocity|damper|cylinder|dcmotor)", "joint", robot.joint
+    )
+    if len(there) > len(actuators):
+        raise UnusableInput(
+            f"{robot.file} has {len(there)} actuators at {robot.joint}, the model {len(actuators)} inputs; "
+            f"take out the others"
+        )
+    if any(not match[0].endswith("/>") for match in there):
+        raise UnusableInput(f"an actuator at {robot.joint} is no single tag; write it as <motor .. />")
+    for match, actuator in reversed(list(zip(there, actuators, strict=False))):  # from the end, so that places stay
+        name = re.search(r"\sname\s*=\s*[\"']([^\"']*)", match[0])
+        kept = dict(actuator) | ({"name": name[1]} if name else {})
+        text = text[: match.start()] + _tag(kept) + text[match.end() :]
+    added = "".join(f"    {_tag(actuator)}\n" for actuator in actuators[len(there) :])
+    if not added:
+        return text
+    bare = _without_comments(text)
+    for end, lines in (("</actuator>", f"{added}  "), ("</mujoco>", f"  <actuator>\n{added}  </actuator>\n")):
+        if (at := bare.rfind(end)) >= 0:
+            return text[:at] + lines.removeprefix("  " if end == "</actuator>" else "") + text[at:]
+    raise UnusableInput(f"{robot.file} has no closing </mujoco>")
+
+
+def _tag(attributes: Mapping[str, Any]) -> str:
+    return f"<general {' '.join(f'{name}={quoteattr(value)}' for name, value in attributes.items())}/>"

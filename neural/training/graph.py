@@ -1,0 +1,163 @@
+"""A trained network as an ONNX graph that simulates like `Network.simulate`; the layers in single precision."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
+from simgap.neural.training.convolution import Convolution, Residual
+from simgap.neural.training.recurrent import Gru, Lstm, Srnn
+from simgap.records import UnusableInput
+
+OPSET = 17
+# Operator of ONNX, its order of the gates of PyTorch, and what else it must be told.
+RECURRENT: dict[type, tuple[str, tuple[int, ...], dict[str, int]]] = {
+    Srnn: ("RNN", (0,), {}), Gru: ("GRU", (1, 0, 2), {"linear_before_reset": 1}), Lstm: ("LSTM", (0, 3, 1, 2), {}),
+}  # fmt: skip
+
+
+class _Graph:
+    """Nodes and constants, as they are added; an array is known by its name."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
+
+    def constant(self, value: Any) -> str:
+        from onnx import numpy_helper
+
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(value), f"c{len(self.constants)}"))
+        return str(self.constants[-1].name)
+
+    def weight(self, tensor: Any) -> str:
+        return self.constant(tensor.detach().cpu().float().numpy())
+
+    def add(self, operator: str, *inputs: str, **attributes: Any) -> str:
+        from onnx import helper
+
+        name = f"v{len(self.nodes)}"
+        self.nodes.append(helper.make_node(operator, list(inputs), [name], **attributes))
+        return name
+
+    def whole(self, *values: int) -> str:
+        return self.constant(np.array(values, dtype=np.int64))
+
+    def block(self, block: Any, x: str) -> str:
+        """Add a block over x [B, T, F]."""
+        match block:
+            case Headed():
+                return self.dense(block.head, self.block(block.body, x))
+            case Recurrences():
+                for layer in block.layers:
+                    x = self.recurrence(layer, x)
+                return x
+            case Pooled():
+                for part, dilation in ((block.first, 1), (block.second, 2)):
+                    x = self.convolution(part, x, dilation)
+                    before = self.add("Pad", x, self.whole(0, dilation, 0, 0, -dilation, 0))
+                    x = self.add("Mul", self.add("Add", x, before), self.constant(np.float32(0.5)))
+                return self.convolution(block.full, x, 4)
+            case Tcn():
+                for level, part in enumerate(block.blocks):
+                    x = self.residual(part, x, 2**level)
+                return x
+            case Parallel():
+                z = self.add("Concat", *(self.block(branch, x) for branch in block.blocks), axis=2)
+                narrow = self.add("Relu", self.dense(block.narrow, z))
+                return self.add("Add", z, self.dense(block.wide, narrow))
+        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
+
+    def dense(self, layer: Any, x: str) -> str:
+        return self.add("Add", self.add("MatMul", x, self.weight(layer.weight.t())), self.weight(layer.bias))
+
+    def recurrence(self, layer: Any, x: str) -> str:
+        operator, order, attributes = RECURRENT[type(layer)]
+
+        def gates(tensor: Any) -> np.ndarray:
+            parts = np.split(tensor.detach().cpu().float().numpy(), len(order))
+            return np.concatenate([parts[i] for i in order])
+
+        w, u = (self.constant(gates(tensor)[None]) for tensor in (layer.weight_ih_l0, layer.weight_hh_l0))
+        offsets = np.concatenate([gates(layer.bias_ih_l0), gates(layer.bias_hh_l0)])[None]
+        x = self.add("Transpose", x, perm=[1, 0, 2])
+        h = self.add(operator, x, w, u, self.constant(offsets), hidden_size=layer.hidden_size, **attributes)
+        return self.add("Transpose", self.add("Squeeze", h, self.whole(1)), perm=[1, 0, 2])  # from [T, 1, B, H]
+
+    def convolution(self, layer: Convolution, x: str, dilation: int) -> str:
+        before = (layer.kernel_size[0] - 1) * dilation
+        x = self.add("Transpose", x, perm=[0, 2, 1])
+        weights = self.weight(layer.weight), self.weight(layer.bias)
+        x = self.add("Conv", x, *weights, pads=[before, 0], dilations=[dilation])
+        return self.add("Transpose", self.add("Relu", x), perm=[0, 2, 1])
+
+    def residual(self, part: Residual, x: str, dilation: int) -> str:
+        inner = self.convolution(part.two, self.convolution(part.one, x, dilation), dilation)
+        around = x if part.through is None else self.dense(part.through, x)
+        return self.add("Relu", self.add("Add", inner, around))
+
+    def scaled(self, x: str, scaling: Any) -> str:
+        shifted = self.add("Sub", x, self.constant(np.array(scaling.middle)))
+        return self.add("Cast", self.add("Div", shifted, self.constant(np.array(scaling.half))), to=1)
+
+    def stateful(self, model: Any) -> str:
+        """Read n measured samples, then run free."""
+        samples = self.add("Shape", "u", start=1, end=2)
+        n = self.add("Shape", "y_init", start=1, end=2)
+        y = self.scaled("y_init", model.of_y)
+        ones = self.add("Pad", y, self.whole(0, 0, 0, 0, 0, 1), self.constant(np.float32(1)))  # y, and 1 behind it
+        free = self.add("Sub", samples, n)
+        pads = self.add("Concat", self.whole(0, 0, 0, 0), free, self.whole(0), axis=0)
+        features = self.add("Concat", self.scaled("u", model.of_x), self.add("Pad", ones, pads), axis=2)
+        return self.add("Slice", self.block(model.trained, features), n, samples, self.whole(1))
+
+    def windowed(self, model: Any) -> str:
+        """Take the window before each sample; before the record its inputs stood still."""
+        if model.window % 4 and any(isinstance(part, Pooled) for part in model.trained.modules()):
+            raise UnusableInput(f"a window of {model.window} samples is no multiple of four, as a pooled one must be")
+        window, inputs, zero, one = model.window, model.inputs, self.whole(0), self.whole(1)
+        shape = self.add("Shape", "u", start=0, end=2)  # [B, T]
+        n = self.add("Shape", "y_init", start=1, end=2)
+        samples = self.add("Slice", shape, one, self.whole(2), zero)
+        scalar = [self.add("Squeeze", value, zero) for value in (n, samples)]
+        numbers = self.add("Range", self.constant(np.int64(0)), scalar[1], self.constant(np.int64(1)))
+        t = self.add("Mul", self.add("Cast", numbers, to=11), self.constant(np.float64(model.dt)))
+        t = self.add("Expand", self.add("Unsqueeze", t, self.whole(0, 2)), self.add("Concat", shape, one, axis=0))
+        x = self.scaled(self.add("Concat", t, "u", axis=2), model.of_x)
+        first = self.add("Slice", x, zero, one, one)
+        padded = self.add("Concat", *[first] * window, x, axis=1)
+        rows = self.add("Unsqueeze", self.add("Range", *scalar, self.constant(np.int64(1))), one)  # [N, 1]
+        which = self.add("Add", rows, self.constant(np.arange(window, dtype=np.int64)[None]))
+        views = self.add("Reshape", self.add("Gather", padded, which, axis=1), self.whole(-1, window, inputs))
+        y = self.add("Gather", self.block(model.trained, views), self.constant(np.int64(window - 1)), axis=1)
+        free = self.add("Sub", samples, n)
+        batch = self.add("Slice", shape, zero, one, zero)
+        outputs = self.whole(len(model.of_y.middle))
+        return self.add("Reshape", y, self.add("Concat", batch, free, outputs, axis=0))
+
+
+def build(model: Any) -> Any:
+    """Build u [B, T, nu], y_init [B, n, ny] -> y_hat [B, T-n, ny], in physical units and double precision."""
+    import onnx
+    from onnx import TensorProto, helper
+
+    graph, ny = _Graph(), len(model.of_y.middle)
+    nu = len(model.of_x.middle) - model.windowed
+    y = graph.windowed(model) if model.windowed else graph.stateful(model)
+    half, middle = graph.constant(np.array(model.of_y.half)), graph.constant(np.array(model.of_y.middle))
+    y = graph.add("Add", graph.add("Mul", graph.add("Cast", y, to=TensorProto.DOUBLE), half), middle)
+    graph.nodes.append(helper.make_node("Identity", [y], ["y_hat"]))
+
+    def value(name: str, *shape: Any) -> Any:
+        return helper.make_tensor_value_info(name, TensorProto.DOUBLE, shape)
+
+    made = helper.make_model(
+        helper.make_graph(
+            graph.nodes, "simulate", [value("u", "B", "T", nu), value("y_init", "B", "n", ny)],
+            [value("y_hat", "B", "N", ny)], graph.constants,
+        ),
+        opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8,
+    )  # fmt: skip
+    onnx.checker.check_model(made, full_check=True)
+    return made

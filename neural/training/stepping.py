@@ -1,0 +1,182 @@
+"""A trained network as a step form, for exports: `layers` takes the features of one sample through all of its parts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.neural.training import steps
+from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
+from simgap.neural.training.convolution import Convolution, Residual
+from simgap.neural.training.recurrent import Gru, Lstm, Srnn
+from simgap.neural.training.scaling import features
+from simgap.records import UnusableInput
+from simgap.step_form import StepForm, source_of
+
+RECURRENT: dict[type, tuple[str, int]] = {Srnn: ("rnn", 1), Gru: ("gru", 1), Lstm: ("lstm", 2)}  # parts of a state
+LAYERS = (
+    steps.sigmoid, steps.weighted, steps.dense, steps.rnn, steps.gru, steps.lstm, steps.remember, steps.convolution,
+    steps.mean_of_two, steps.add, steps.copy,
+)  # fmt: skip
+STATEFUL = '''\
+def step(s: list, u: list, y: list):
+    """Fill y(k) from u(k), and take the state to the next sample; there is no measured output."""
+    x = [0.0] * {inputs}
+    for i in range({nu}):
+        x[i] = (u[i] - X_MIDDLE[i]) / X_HALF[i]
+    layers(s, x, y)
+    for i in range({ny}):
+        y[i] = y[i] * Y_HALF[i] + Y_MIDDLE[i]
+'''
+WINDOWED = '''\
+def step(s: list, u: list, y: list):
+    """Fill y(k) from the window of inputs before u(k), and append u(k) to it; s[{count}] counts samples."""
+    x = [0.0] * {inputs}
+    now = [0.0] * {inputs}
+    now[0] = (s[{count}] * {dt!r} - X_MIDDLE[0]) / X_HALF[0]
+    for i in range({nu}):
+        now[1 + i] = (u[i] - X_MIDDLE[1 + i]) / X_HALF[1 + i]
+    if s[{count}] == 0.0:
+        for w in range({window}):
+            copy(now, {inputs}, s, {buffer} + w * {inputs})
+    for i in range({buffer}):
+        s[i] = 0.0
+    for w in range({window}):
+        for i in range({inputs}):
+            x[i] = s[{buffer} + w * {inputs} + i]
+        layers(s, x, y)
+    remember(now, {inputs}, s, {buffer}, {window})
+    s[{count}] += 1.0
+    for i in range({ny}):
+        y[i] = y[i] * Y_HALF[i] + Y_MIDDLE[i]
+'''
+
+
+class _Writer:
+    """Writes `layers`, and hands out arrays, constants and places in the state on the way."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.constants: dict[str, np.ndarray] = {}
+        self.arrays = self.cells = 0
+
+    def array(self, size: int) -> str:
+        self.arrays += 1
+        self.lines.append(f"v{self.arrays} = [0.0] * {size}")
+        return f"v{self.arrays}"
+
+    def take(self, count: int) -> int:
+        self.cells += count
+        return self.cells - count
+
+    def weights(self, *tensors: Any) -> str:
+        names = []
+        for tensor in tensors:
+            names.append(f"W{len(self.constants)}")
+            self.constants[names[-1]] = tensor.detach().cpu().double().numpy().ravel()
+        return ", ".join(names)
+
+    def block(self, block: Any, x: str, nx: int) -> tuple[str, int]:
+        """Write a block over the array x [nx]; return its array and size."""
+        match block:
+            case Headed():
+                return self.dense(block.head, *self.block(block.body, x, nx))
+            case Recurrences():
+                for layer in block.layers:
+                    x, nx = self.recurrence(layer, x, nx)
+                return x, nx
+            case Pooled():
+                for part, dilation in ((block.first, 1), (block.second, 2)):
+                    x, nx = self.convolution(part, x, nx, dilation)
+                    y, at = self.array(nx), self.take((dilation + 1) * nx)
+                    self.lines.append(f"mean_of_two({x}, {nx}, s, {at}, {dilation}, {y})")
+                    x = y
+                return self.convolution(block.full, x, nx, 4)
+            case Tcn():
+                for level, part in enumerate(block.blocks):
+                    x, nx = self.residual(part, x, nx, 2**level)
+                return x, nx
+            case Parallel():
+                return self.parallel(block, x, nx)
+        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
+
+    def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:
+        ny = layer.out_features
+        y = self.array(ny)
+        self.lines.append(f"dense({x}, {nx}, {y}, {ny}, {self.weights(layer.weight, layer.bias)}, {positive})")
+        return y, ny
+
+    def recurrence(self, layer: Any, x: str, nx: int) -> tuple[str, int]:
+        name, parts = RECURRENT[type(layer)]
+        n = layer.hidden_size
+        new, at = self.array(n), self.take(parts * n)
+        weights = self.weights(layer.weight_ih_l0, layer.weight_hh_l0, layer.bias_ih_l0, layer.bias_hh_l0)
+        self.lines.append(f"{name}({x}, {nx}, s, {at}, {n}, {new}, {weights})")
+        return new, n
+
+    def convolution(self, layer: Convolution, x: str, nx: int, dilation: int) -> tuple[str, int]:
+        ny, kernel = layer.out_channels, layer.kernel_size[0]
+        y, at = self.array(ny), self.take(((kernel - 1) * dilation + 1) * nx)
+        weights = self.weights(layer.weight, layer.bias)
+        self.lines.append(f"convolution({x}, {nx}, s, {at}, {y}, {ny}, {weights}, {kernel}, {dilation})")
+        return y, ny
+
+    def residual(self, part: Residual, x: str, nx: int, dilation: int) -> tuple[str, int]:
+        inner, ny = self.convolution(part.one, x, nx, dilation)
+        inner, ny = self.convolution(part.two, inner, ny, dilation)
+        around = x if part.through is None else self.dense(part.through, x, nx)[0]
+        y = self.array(ny)
+        self.lines.append(f"add({inner}, {around}, {ny}, {y}, 1)")
+        return y, ny
+
+    def parallel(self, block: Parallel, x: str, nx: int) -> tuple[str, int]:
+        branches = [self.block(branch, x, nx) for branch in block.blocks]
+        size = sum(n for _, n in branches)
+        z, at = self.array(size), 0
+        for branch, n in branches:
+            self.lines.append(f"copy({branch}, {n}, {z}, {at})")
+            at += n
+        wide, _ = self.dense(block.wide, *self.dense(block.narrow, z, size, 1))
+        y = self.array(size)
+        self.lines.append(f"add({z}, {wide}, {size}, {y}, 0)")
+        return y, size
+
+
+def step_form(model: Any, nu: int, ny: int) -> StepForm:
+    """Write a trained network as a step; at rest its states are zero. Raises UnusableInput for unknown parts."""
+    writer, inputs, window = _Writer(), model.inputs, model.window
+    if model.windowed and window % 4 and any(isinstance(part, Pooled) for part in model.trained.modules()):
+        raise UnusableInput(f"a window of {window} samples is no multiple of four, which a pooled one takes in a step")
+    y, _ = writer.block(model.trained, "x", inputs)
+    layers = "\n    ".join(
+        ["def layers(s: list, x: list, y: list):", '"""Take the features x of a sample through the network."""',
+         *writer.lines, f"copy({y}, {ny}, y, 0)"]
+    )  # fmt: skip
+    scaling = {"X_MIDDLE": model.of_x.middle, "X_HALF": model.of_x.half, "Y_MIDDLE": model.of_y.middle,
+               "Y_HALF": model.of_y.half}  # fmt: skip
+    constants = {name: np.array(value) for name, value in scaling.items()} | writer.constants
+    size, count = writer.cells, writer.cells + window * inputs
+    step = (WINDOWED if model.windowed else STATEFUL).format(
+        inputs=inputs, nu=nu, ny=ny, window=window, buffer=size, count=count, dt=model.dt
+    )
+    source = "\n\n".join([*map(source_of, LAYERS), layers + "\n", step]).replace("\n\ndef", "\n\n\ndef")
+    rest = np.zeros(count + 1 if model.windowed else max(size, 1))
+    return StepForm(source, constants, rest, nu, ny, not model.windowed)
+
+
+def start(model: Any, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
+    """Return the state of that step after n measured samples."""
+    n, (nu, ny) = len(y_init), (u.shape[1], y_init.shape[1])
+    form = step_form(model, nu, ny)
+    x = model.of_x.inside(features(u, model.dt, model.windowed))[:n]
+    state = form.rest.tolist()
+    if model.windowed:
+        rows = np.concatenate((np.repeat(x[:1], max(0, model.window - n), axis=0), x[-model.window :]))
+        size = len(state) - 1 - rows.size
+        return np.concatenate((np.zeros(size), rows.ravel(), [float(n)]))
+    layers, y = form.functions["layers"], [0.0] * ny
+    for row in np.column_stack((x, model.of_y.inside(y_init), np.ones(n))).tolist():
+        layers(state, row, y)
+    return np.array(state)

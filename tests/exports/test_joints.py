@@ -1,0 +1,135 @@
+"""A grey box as a joint of MuJoCo and URDF: it moves as ours, in SI units, and says what it cannot hold."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import simgap
+from simgap.cli import main
+from simgap.data.simulated.rigs import hide
+from simgap.exports import export as exports
+from simgap.exports.export import export
+from simgap.exports.joints import CHANGES, MJCF, URDF, effects_table
+from simgap.records import UnusableInput
+from simgap.saved.archive import FittedOn, SavedModel
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+KNOWN = {"inertia": 0.3}
+ROBOT = """
+<mujoco model="robot">
+  <!-- <joint name="rail"/> is below -->
+  <worldbody>
+    <body>
+      <joint name="rail" type="slide"   axis="1 0 0" damping='3' />
+      <geom size="0.1" mass="0.1"/>
+      <body pos="0.2 0 0"><joint name="tilt" axis="0 1 0"/><geom size=".05" mass="0.05"/></body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="push" joint="rail" gear="7"/>
+  </actuator>
+  <sensor><actuatorfrc actuator="push"/></sensor>
+</mujoco>
+"""
+
+
+def fitted(rig, *effects):
+    data = hide(rig, dict.fromkeys(effects, 0.5))
+    model = simgap.fit("greybox", data, {"effects": list(effects)}).model
+    return SavedModel("greybox", model, FittedOn.of(data)), data
+
+
+@pytest.fixture(scope="module")
+def cart():
+    return fitted("cart", "coulomb_friction")
+
+
+def test_the_tables_name_effects_and_the_readme_shows_them():
+    assert {*URDF} <= {*MJCF} == {*CHANGES}
+    assert "\n".join(effects_table()) in (Path(exports.__file__).parent / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("rig", "effects", "forms", "limit"),
+    [
+        ("cart", ("input_saturation",), ("mjcf", "urdf"), 1e-6),
+        ("stage", (), ("mjcf",), 1e-6),
+        ("arm", ("gravity", "coulomb_friction"), ("mjcf", "urdf"), 1e-2),
+        ("stage", ("input_delay", "cubic_stiffness"), ("mjcf",), 1e-2),
+    ],
+)
+def test_mujoco_moves_the_joint_as_our_simulation(rig, effects, forms, limit, tmp_path):
+    saved, data = fitted(rig, *effects)
+    for form in forms:
+        done = export(saved, data, form, tmp_path / form, plant=KNOWN)
+        assert done.passed and done.limit == limit, str(done)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", [name for name in MJCF if name not in ("gravity", "input_saturation")])
+def test_every_effect_of_the_table_moves_it_so(effect, tmp_path):
+    saved, data = fitted("stage", effect)
+    assert export(saved, data, "mjcf", tmp_path / "out", plant=KNOWN).passed
+
+
+def test_a_torque_constant_tells_the_inertia(cart, tmp_path):
+    saved, data = cart
+    export(saved, data, "urdf", tmp_path / "out", plant={"torque_constant": 0.3})
+    mass = float(ET.parse(tmp_path / "out" / "model.urdf").find(".//mass").get("value"))
+    plant = saved.model.plants[0].estimate
+    np.testing.assert_allclose(mass * plant.theta[plant.plant.layout.gains], 0.3)
+
+
+@pytest.mark.parametrize(
+    ("rig", "effects", "form", "plant", "sentence"),
+    [
+        ("cart", (), "mjcf", {}, "forces need the inertia of the joint"),
+        ("stage", (), "urdf", KNOWN, "cannot hold a spring"),
+        ("stage", ("stribeck_friction",), "mjcf", KNOWN, "cannot hold stribeck_friction"),
+        ("tank", (), "mjcf", KNOWN, "takes a rigid joint"),
+    ],
+)
+def test_what_it_cannot_hold_is_said(rig, effects, form, plant, sentence, tmp_path):
+    saved, data = fitted(rig, *effects)
+    with pytest.raises(UnusableInput, match=sentence):
+        export(saved, data, form, tmp_path / "out", plant=plant)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_joint_goes_into_the_users_file_and_nothing_else_changes(cart, tmp_path):
+    saved, data = cart
+    (tmp_path / "robot.xml").write_text(ROBOT)
+    into = {"into": tmp_path / "robot.xml", "joint": "rail"}
+    export(saved, data, "mjcf", tmp_path / "out", plant=KNOWN, **into)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot_patched.xml"))
+    alone = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "model.xml"))
+    assert model.joint("rail").damping == alone.joint("joint").damping
+    assert model.joint("rail").frictionloss == alone.joint("joint").frictionloss
+    assert model.actuator("push").gainprm[0] == alone.actuator_gainprm[0, 0]
+    np.testing.assert_allclose(model.joint("rail").armature, 0.3 - 0.15)
+    diff = (tmp_path / "out" / "patch.diff").read_text().splitlines()
+    assert [line[0] for line in diff if line[0] in "+-" and line[:3] not in ("+++", "---")] == ["-", "+", "-", "+"]
+
+
+@pytest.mark.parametrize(
+    ("joint", "inertia", "sentence"),
+    [("tilt", 0.3, "is a hinge"), ("wheel", 0.3, "it has rail, tilt"), ("rail", 0.1, "the bodies at rail have 0.15")],
+)
+def test_a_file_that_does_not_fit_is_refused(cart, joint, inertia, sentence, tmp_path):
+    saved, data = cart
+    (tmp_path / "robot.xml").write_text(ROBOT)
+    with pytest.raises(UnusableInput, match=sentence):
+        export(
+            saved, data, "mjcf", tmp_path / "out", plant={"inertia": inertia}, into=tmp_path / "robot.xml", joint=joint
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_known_of_the_machine_is_a_positive_number(tmp_path, capsys):
+    for text in ("inertia=-1", "inertia=x", "mass=1"):
+        assert (
+            main(["export", "greybox", "x.csv", "--to", "mjcf", "--out", str(tmp_path / "new"), "--plant", text]) == 2
+        )
+        assert "a positive number" in capsys.readouterr().err
