@@ -8,8 +8,8 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline
 from simgap.greybox.position_and_velocity import with_kind
-from simgap.greybox.selection import Selection
-from simgap.greybox.trial import CONSISTENT
+from simgap.greybox.selection import BETTER, Selection
+from simgap.greybox.trial import CONSISTENT, score_gain
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -19,7 +19,7 @@ BEYOND = 0.1
 def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> Baseline | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
-    What is nonlinear must simulate held-out data better than that. A lag or a delay is a linear model itself, of few
+    What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear model itself, of few
     parameters, and is believed as long as more of them hardly help. None too for an output that is no motion and no
     level, whose plain model is this one already, and where effects are of single experiments and cannot be forecast.
     """
@@ -37,4 +37,5 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
-    return None if in_most(-gain) else linear
+    higher = score_gain(plain, chosen, linear, linear.estimate) > BETTER
+    return None if higher and not in_most(gain) else linear
