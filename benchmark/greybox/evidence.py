@@ -182,7 +182,8 @@ class Evidence:
     def _channel(self, term: Term) -> str:
         """The name of the input or output that an effect sits on; empty for a force."""
         if term.effect.port == "input":
-            return self.channels.inputs[term.channel].name
+            inputs = self.channels.inputs  # after the last of them, the command of a controller inside
+            return inputs[term.channel].name if term.channel < len(inputs) else "controller"
         outputs = self.identified.plant.outputs
         return self.channels.outputs[outputs[term.channel]].name if term.effect.port == "output" else ""
 

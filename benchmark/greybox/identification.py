@@ -13,6 +13,7 @@ from simgap.greybox.joint import is_better, on_joint, with_joint
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.linear_rival import linear_rival
+from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
@@ -53,7 +54,7 @@ def identify(data: TrainingSet) -> list[Identified]:
         settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
         selection = _selected(data, of_kind, outputs, settled)
-        linear = linear_rival(data, of_kind, selection)
+        linear = None if channels.plant is not None else linear_rival(data, of_kind, selection)
         best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
         identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
     return identified
@@ -70,6 +71,8 @@ def channels_of(identified: Sequence[Identified], data: TrainingSet) -> Channels
 
 def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], settled: Settled | None) -> Selection:
     """Select effects of a rigid drive and, where a flexible joint adds to them, of a drive with one; the better one."""
+    if channels.plant is not None:
+        return select(find_machine_baseline(data.train, data.valid, channels, outputs, data.n_init))
     rigid = _rigid(data, channels, outputs, settled)
     joint = with_joint(rigid, channels)
     if joint is None or not is_better(on_joint(joint, rigid.trial.estimate), joint, rigid):

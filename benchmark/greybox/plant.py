@@ -10,14 +10,17 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
+from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
-from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
 from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
 
 # Of poles, per sample.
 FASTEST_TANK = 5.0
 FASTEST = 1e6
+MAX_TERMS = 5  # that a search may find
+MOST_OF_A_MACHINE = 8
 
 
 def plants_of(channels: Channels) -> list[tuple[int, ...]]:
@@ -79,7 +82,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Plant:
-    """A linear plant of given order with the effects on it.
+    """A linear plant of given order, or a known machine, with the effects on it.
 
     Companion form (all kinds but level), z = (x, x', ..), the product of sections s^2 + a1 s + a0 and s + a:
 
@@ -106,11 +109,30 @@ class Plant:
     scales: PlantScales | None = None  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
     joint: two_masses.Side = ""
+    machine: machines.Machine | None = None  # of which something is known; its numbers stand where the poles do
 
     @property
     def ny(self) -> int:
         """Number of outputs."""
         return 1 + self.two_outputs
+
+    @property
+    def input_channels(self) -> Sequence[int]:
+        """Where effects of an input act: on each input, or on the goal of a controller and, as nu, on its command."""
+        if self.machine is None:
+            return range(self.nu)
+        return (self.machine.of_drive, self.nu) if self.machine.controlled else (self.machine.of_drive,)
+
+    def takes(self, effect: Effect, channel: int) -> bool:
+        """Tell whether an effect may act there: on the goal of a controller few do, on its command those that can."""
+        if not isinstance(effect, InputEffect) or self.machine is None or not self.machine.controlled:
+            return not (self.machine is not None and self.machine.known.gravity and effect.replaces_spring)
+        return effect.command is not None if channel == self.nu else effect.on_goal
+
+    @property
+    def most_terms(self) -> int:
+        """Effects that a search may find: more of a machine whose constants it need not find as well."""
+        return MAX_TERMS if self.machine is None else MOST_OF_A_MACHINE
 
     @property
     def sign_hidden(self) -> bool:
@@ -139,8 +161,9 @@ class Plant:
     @cached_property
     def layout(self) -> Layout:
         """Where each part of theta stands."""
-        poles = two_masses.WIDTH if self.joint else self.order
-        widths = [poles, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs)]
+        poles = two_masses.WIDTH if self.joint else len(machines.NAMES) if self.machine else self.order
+        gains = 1 if self.machine else self.nu * len(self.taps)
+        widths = [poles, gains, int(self.offset), self.zeros, int(self.two_outputs)]
         widths += [0 if t in self.per_experiment else len(self.parameters_of(t)) for t in self.terms]
         slices = [slice(end - width, end) for width, end in zip(widths, accumulate(widths), strict=True)]
         return Layout(*slices[:5], terms=tuple(slices[5:]))
@@ -204,9 +227,13 @@ class Plant:
         squared = [not self.cascade and i % 2 == 1 for i in range(self.order)]  # the a0 of each s^2 + a1 s + a0
         powers = two_masses.POWERS if self.joint else [1 + square for square in squared]
         linear = [Parameter(f"a{i}", "", 0.0, fastest**power) for i, power in enumerate(powers)]
-        if (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
+        if self.machine is not None:
+            linear = self.machine.parameters
+            if any(term.effect.replaces_spring for term in self.terms):
+                linear[machines.STIFFNESS] = Parameter.absent("stiffness")
+        elif (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
             linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
-        linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]
+        linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.layout.gains.stop - self.layout.gains.start)]
         linear += [Parameter("d", "", -inf, inf)] * self.offset
         linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
         linear += [Parameter("g", "", -inf, inf)] * self.two_outputs
@@ -265,11 +292,15 @@ class Plant:
     @cached_property
     def substeps(self) -> int:
         """Substeps per sample: what the most demanding term asks for."""
+        if self.machine is not None:
+            return machines.SUBSTEPS
         return 1 if self.imposed else max((term.effect.substeps for term in self.terms), default=1)
 
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """Return A of z' = A z + (inputs and forces)."""
         sections, n = theta[self.layout.poles], self.order
+        if self.machine is not None:
+            return self.machine.linear(theta, n)
         if self.joint:
             return two_masses.matrix(sections)
         if self.cascade:

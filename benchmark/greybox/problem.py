@@ -142,6 +142,8 @@ class Problem:
         One that is near zero has a share of what would be its size beside the others', in its own unit.
         """
         plant, layout, records = self.plant, self.plant.layout, self.records
+        if plant.machine is not None:
+            return self._with_terms(plant.machine.sizes(theta, records.duration, plant.order))
         poles = np.abs(theta[layout.poles])
         slowest, speed = 1 / records.duration, 1.0
         natural = np.empty(len(poles))
@@ -162,6 +164,11 @@ class Problem:
         sizes[layout.offset] = np.maximum(sizes[layout.offset], drive)
         sizes[layout.zeros] = np.maximum(sizes[layout.zeros], SMALL * plant.dt ** np.arange(1.0, 1 + plant.zeros))
         sizes[layout.velocity] = np.maximum(sizes[layout.velocity], SMALL * self._sizes[-1] / self._sizes[0] * plant.dt)
+        return self._with_terms(sizes)
+
+    def _with_terms(self, sizes: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """Give the parameters of terms that are near zero a share of where they usually start."""
+        plant = self.plant
         for term in plant.terms:
             if term in plant.per_experiment:
                 continue

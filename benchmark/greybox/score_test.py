@@ -32,8 +32,8 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
         effect = EFFECTS[name]()
         if not effect.simulated or name in contained or (effect.time_power is not None and not baseline.repeated):
             continue
-        channels = {"input": plant.nu, "force": 1, "output": plant.ny}[effect.port]
-        on_channels = [Term(effect, channel) for channel in range(channels)]
+        channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
+        on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]
         listed += [
             t for t in on_channels
             if t.key not in taken and effect.applies_to(scales.of(t)) and effect.starts(scales.of(t))

@@ -24,7 +24,6 @@ R = TypeVar("R")
 CONFIRMED = 8.0
 # By how much the score of another choice of effects must be better to be preferred to the first one.
 BETTER = 1.0
-MAX_TERMS = 5
 # Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
@@ -106,7 +105,7 @@ class _Search:
 
     def forward(self, trial: Trial, linear_only: bool = False) -> Trial:
         """Add the best effect, one after the other, while noise alone would not do as well."""
-        while len(trial.terms) < MAX_TERMS:
+        while len(trial.terms) < self.baseline.plant.most_terms:
             trials = compare(self.baseline, trial.estimate, self.noise_order, self.compared, linear_only)
             if trials:
                 best = min(trials, key=lambda trial: trial.estimate.squares).estimate
@@ -135,7 +134,7 @@ class _Search:
 
         Where the search ran into the largest number of effects, no exchange makes them the explanation.
         """
-        for term in trial.terms if 1 < len(trial.terms) < MAX_TERMS else ():
+        for term in trial.terms if 1 < len(trial.terms) < self.baseline.plant.most_terms else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
             rest = self._without(trial, term)

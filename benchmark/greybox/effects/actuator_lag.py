@@ -37,6 +37,7 @@ class ActuatorLag(InputEffect):
         "pipe, the inner loop of a drive."
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
+    on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 70
     linear: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
