@@ -14,7 +14,7 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.linear import errors_on
 from simgap.greybox.machine import DAMPING, INERTIA, NAMES, STIFFNESS, Machine, machine_of
 from simgap.greybox.noise import white, white_as_large_as
-from simgap.greybox.outliers import find_outliers, without_outliers
+from simgap.greybox.outliers import find_glitches, without_outliers
 from simgap.greybox.plant import Plant, PlantScales
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
@@ -40,7 +40,9 @@ def find_machine_baseline(
     plant = Plant(kind, ORDERS[kind], records.u.shape[2], records.dt, machine=machine)
     plain = fit_machine(plant, records)
     stepped = quantisation_step(records.y[..., 0])
-    outliers = [] if stepped else find_outliers(plain.errors, records.mask, records.resolution)
+    # Bad readings are few, so that all records are asked for them.
+    every = Records.of(train, outputs)
+    outliers = [] if stepped else find_glitches(errors_on(plain, every, n_init), every.mask)
     if outliers:
         records = without_outliers(records, plain.errors, outliers)
         held_out = without_outliers(held_out, errors_on(plain, held_out, n_init), outliers) if valid else records

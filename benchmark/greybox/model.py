@@ -124,7 +124,7 @@ class FittedPlant:
                 y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
         if self.outliers:
             error = experiment.y[n_init:, outputs] - y_hat
-            flags = flag(error[None], np.ones((1, len(error)), dtype=bool))[0]
+            flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
             for j in (outliers.output for outliers in self.outliers):
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat

@@ -124,9 +124,15 @@ class Plant:
         return (self.machine.of_drive, self.nu) if self.machine.controlled else (self.machine.of_drive,)
 
     def takes(self, effect: Effect, channel: int) -> bool:
-        """Tell whether an effect may act there: on the goal of a controller few do, on its command those that can."""
-        if not isinstance(effect, InputEffect) or self.machine is None or not self.machine.controlled:
-            return not (self.machine is not None and self.machine.known.gravity and effect.replaces_spring)
+        """Tell whether an effect may act there: on the goal of a controller few do, on its command those that can.
+
+        The conditions of a known machine differ from run to run, and a drift of each run's own would stand for them.
+        """
+        if self.machine is None:
+            return True
+        if not isinstance(effect, InputEffect) or not self.machine.controlled:
+            known = bool(self.machine.known.gravity) and effect.replaces_spring
+            return not known and effect.time_power is None
         return effect.command is not None if channel == self.nu else effect.on_goal
 
     @property
