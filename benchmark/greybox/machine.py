@@ -17,6 +17,7 @@ NAMES = ("inertia", "damping", "back_emf", "mass", "arm", "derivative", "stiffne
 INERTIA, DAMPING, BACK_EMF, MASS, ARM, DERIVATIVE, STIFFNESS = range(len(NAMES))
 SUBSTEPS = 4
 INF = math.inf
+LESS = 0.1  # of the damping
 SMALL = 1e-3  # share of its usual size that a number near zero counts as
 
 
@@ -80,6 +81,12 @@ class Machine:
             shape[DAMPING : BACK_EMF + 1] *= damping
             shapes.append(np.clip(shape, [p.low for p in self.parameters], [p.high for p in self.parameters]))
         return shapes
+
+    def less_damped(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """Take the damping away that may have stood in for another force."""
+        less = theta.copy()
+        less[DAMPING] = np.clip(LESS * less[DAMPING], self.parameters[DAMPING].low, self.parameters[DAMPING].high)
+        return less
 
     def column(self, u: Float[np.ndarray, "E T nu"], known: Known | None, other: float) -> Float[np.ndarray, "E T"]:
         """Return a constant over time: a column in SI units, a number, or `other` where it is not known."""

@@ -23,6 +23,7 @@ from simgap.records import Channels, Experiment
 
 # A machine has records of many conditions, and a search sees whole ones, so that each begins at rest.
 SEARCH_SAMPLES = 12_000
+HELD_OUT_SAMPLES = 18_000
 LONG = 2_000  # samples of a record that is cut in pieces instead
 FINALISTS = 2
 ORDERS = {"position": 2, "velocity": 1, "level": 1}
@@ -33,8 +34,11 @@ def find_machine_baseline(
 ) -> Baseline:
     """Fit the plain model of a known machine to some of the experiments. Raises UnusableInput."""
     check_numbers([*train, *valid], channels)
-    records = Records.of(spread(train), outputs)
-    held_out = Records.of(spread(valid), outputs) if valid else records
+    chosen = spread(train)
+    records = Records.of(chosen, outputs)
+    # What the search does not see of the training runs judges it too: few validation runs know few conditions.
+    unseen = spread([x for x in train if not any(x is one for one in chosen)], HELD_OUT_SAMPLES)
+    held_out = Records.of([*spread(valid), *unseen], outputs) if valid or unseen else records
     machine = machine_of(channels, Records.of(train, outputs).u[:, :1])
     kind = channels.outputs[outputs[0]].kind
     plant = Plant(kind, ORDERS[kind], records.u.shape[2], records.dt, machine=machine)
@@ -45,28 +49,36 @@ def find_machine_baseline(
     outliers = [] if stepped else find_glitches(errors_on(plain, every, n_init), every.mask)
     if outliers:
         records = without_outliers(records, plain.errors, outliers)
-        held_out = without_outliers(held_out, errors_on(plain, held_out, n_init), outliers) if valid else records
+        held_out = without_outliers(held_out, errors_on(plain, held_out, n_init), outliers) if valid or unseen else records
         plain = fit_machine(plant, records)
+    # A run in which the machine sticks must not bend the model of all others.
+    soft = 1.4826 * float(np.median(np.abs(plain.errors[records.mask])))
+    records, held_out = replace(records, soft=soft), replace(held_out, soft=soft)
+    plain = fit_machine(plant, records, plain)
     plain = replace(plain, plant=replace(plant, scales=machine_scales(plain, records, channels, outputs)))
     cut = max(map(len, train)) > records.mask.shape[1]
     return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers))
 
 
-def spread(experiments: Sequence[Experiment]) -> list[Experiment]:
+def spread(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> list[Experiment]:
     """Take whole experiments, evenly spread, of those that are not long."""
-    wanted = max(2, SEARCH_SAMPLES // max(map(len, experiments)))
+    if not experiments:
+        return []
+    wanted = max(2, samples // max(map(len, experiments)))
     if max(map(len, experiments)) > LONG:
-        return excerpts(experiments, SEARCH_SAMPLES)
+        return excerpts(experiments, samples)
     if len(experiments) <= wanted:
         return list(experiments)
     return [experiments[i] for i in np.unique(np.linspace(0, len(experiments) - 1, wanted).round().astype(int))]
 
 
-def fit_machine(plant: Plant, records: Records) -> Estimate:
-    """Fit a machine without effects, from the best of a grid of its natural frequency, damping and inertia."""
+def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -> Estimate:
+    """Fit a machine without effects, from the best of a grid of its natural frequency, damping and inertia, or from `start`."""
     machine = plant.machine
     assert machine is not None
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
+    if start is not None:
+        return _weighed(descend(problem, start.theta, start.local), records)
     gain = np.arange(plant.size) == plant.layout.gains.start
     tried = []
     for theta in _grid(machine, plant, records):
@@ -74,8 +86,13 @@ def fit_machine(plant: Plant, records: Records) -> Estimate:
         tried.append(descend(problem, theta, fixed=fixed, max_steps=2))
     tried.sort(key=lambda fit: fit.squares)
     best = min((descend(problem, fit.theta, fit.local) for fit in tried[:FINALISTS]), key=lambda fit: fit.squares)
-    noise = white_as_large_as(best.errors, records.mask, records.resolution)
-    return descend(Problem(plant, records, noise), best.theta, best.local)
+    return _weighed(best, records)
+
+
+def _weighed(fit: Estimate, records: Records) -> Estimate:
+    """Count the squares in units of the errors' own size, as those of all models with effects are counted."""
+    noise = white_as_large_as(fit.errors, records.mask, records.resolution)
+    return replace(fit, squares=Problem(fit.plant, records, noise).squares(fit.errors))
 
 
 def _grid(machine: Machine, plant: Plant, records: Records) -> Iterator[Float[np.ndarray, " p"]]:

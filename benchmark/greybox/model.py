@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -42,6 +42,7 @@ class FittedPlant:
         first = descend(Problem(start.plant, records, baseline.noise), start.theta, fixed=fixed)
         if baseline.outliers:
             records = without_outliers(records, first.errors, baseline.outliers)
+        records = replace(records, soft=baseline.train.soft)
         estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local)
         usual = usual_start(_forecasting(start.plant), estimate, records, baseline.noise, baseline.n_init)
         return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers, usual)

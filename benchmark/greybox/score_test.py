@@ -62,7 +62,10 @@ def score(
         part, amplitude = plant.part_of(term), start.amplitude
         theta[part] = start.values
         with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
-            change = extended.simulator.run(theta, local) - without
+            if baseline.train.soft:
+                change = estimate.errors - extended.errors(theta, local)
+            else:
+                change = extended.simulator.run(theta, local) - without
         d = noise.whiten(np.where(baseline.train.mask[:, :, None], change, 0.0)).reshape(e.shape)
         if not (jacobian.finite and 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE):
             scored.append((0.0, theta, local))
@@ -105,7 +108,10 @@ def extend(
     scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
     if not scored or scored[0][0] < WORTH_A_REFIT:
         return None
-    return baseline.fit(plant.terms, [(theta, local) for _, theta, local in scored[:STARTS]], max_steps)
+    begun = [(theta, local) for _, theta, local in scored[:STARTS]]
+    if plant.machine is not None and term.effect.port == "force":
+        begun += [(plant.machine.less_damped(theta), local) for theta, local in begun]
+    return baseline.fit(plant.terms, begun, max_steps)
 
 
 def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:

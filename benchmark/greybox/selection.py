@@ -107,7 +107,7 @@ class _Search:
         """Add the best effect, one after the other, while noise alone would not do as well."""
         while len(trial.terms) < self.baseline.plant.most_terms:
             trials = compare(self.baseline, trial.estimate, self.noise_order, self.compared, linear_only)
-            if trials:
+            if trials and self.baseline.plant.machine is None:  # whose many free runs judge, not the next sample
                 best = min(trials, key=lambda trial: trial.estimate.squares).estimate
                 self.noise_order = schwarz_order(best.errors, self.baseline.train.mask, self.baseline.resolution)
                 trial = self._assess(trial.estimate)
