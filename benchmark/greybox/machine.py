@@ -15,7 +15,7 @@ from simgap.records import Channels
 # The numbers of a machine in theta, in this order; the gain of the drive follows them.
 NAMES = ("inertia", "damping", "back_emf", "mass", "arm", "derivative", "stiffness")
 INERTIA, DAMPING, BACK_EMF, MASS, ARM, DERIVATIVE, STIFFNESS = range(len(NAMES))
-SUBSTEPS = 4
+SUBSTEPS = 2
 INF = math.inf
 LESS = 0.1  # of the damping
 SMALL = 1e-3  # share of its usual size that a number near zero counts as

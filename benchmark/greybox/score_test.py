@@ -96,7 +96,7 @@ def extend(
     plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)])
-    if term.effect.moves_poles:
+    if term.effect.moves_poles and plant.machine is None:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
         if not term.effect.errors_grow or plant.per_experiment:
@@ -112,6 +112,16 @@ def extend(
     if plant.machine is not None and term.effect.port == "force":
         begun += [(plant.machine.less_damped(theta), local) for theta, local in begun]
     return baseline.fit(plant.terms, begun, max_steps)
+
+
+def promising(baseline: Baseline, estimate: Estimate, terms: Sequence[Term], jacobian: Jacobian, count: int) -> list[Term]:
+    """Keep the terms with the best score tests; a machine that is known needs no other poles for any of them."""
+
+    def best(term: Term) -> float:
+        plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
+        return max((scored[0] for scored in score(baseline, estimate, plant, term, jacobian)), default=0.0)
+
+    return sorted(terms, key=best, reverse=True)[:count]
 
 
 def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:

@@ -14,7 +14,7 @@ from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
-from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of
+from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of, promising
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
 T = TypeVar("T")
@@ -27,6 +27,7 @@ BETTER = 1.0
 # Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
+FINALISTS_OF_MACHINE = 3
 MORE_STEPS = 8  # until they are compared again
 
 Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
@@ -199,9 +200,12 @@ def compare(
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
+    finalists = FINALISTS
+    if baseline.plant.machine is not None:
+        tried, finalists = promising(baseline, estimate, tried, jacobian, FINALISTS), FINALISTS_OF_MACHINE
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _anew(baseline, estimate, _race(baseline, begun[:FINALISTS], worth))
+    finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
     compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
 

@@ -24,7 +24,6 @@ HELD_OUT = 3.0
 # Chance of a gain in held-out blocks where there is none; for normal gains, 1.3 standard errors of their mean.
 BY_CHANCE = 0.1
 CONSISTENT = 1.3
-CLEARLY = 2.0  # standard errors
 BLOCKS = 20
 WORST = 10.0  # times the squares of the mean model: what the error of a held-out block counts at most
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
@@ -128,7 +127,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     most = WORST * baseline.squares_of_mean / len(smaller.blocks)
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
-    of_many = baseline.plant.machine is not None and gain.mean() > CLEARLY * gain.std() / math.sqrt(len(gain))
+    of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
     return of_many or in_most(gain)
 
 
