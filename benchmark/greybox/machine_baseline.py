@@ -49,7 +49,9 @@ def find_machine_baseline(
     outliers = [] if stepped else find_glitches(errors_on(plain, every, n_init), every.mask)
     if outliers:
         records = without_outliers(records, plain.errors, outliers)
-        held_out = without_outliers(held_out, errors_on(plain, held_out, n_init), outliers) if valid or unseen else records
+        held_out = (
+            without_outliers(held_out, errors_on(plain, held_out, n_init), outliers) if valid or unseen else records
+        )
         plain = fit_machine(plant, records)
     # A run in which the machine sticks must not bend the model of all others.
     soft = 1.4826 * float(np.median(np.abs(plain.errors[records.mask])))

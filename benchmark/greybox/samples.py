@@ -70,7 +70,9 @@ class Records:
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""
-        return Records(np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt, self.soft)
+        return Records(
+            np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt, self.soft
+        )
 
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""

@@ -114,7 +114,9 @@ def extend(
     return baseline.fit(plant.terms, begun, max_steps)
 
 
-def promising(baseline: Baseline, estimate: Estimate, terms: Sequence[Term], jacobian: Jacobian, count: int) -> list[Term]:
+def promising(
+    baseline: Baseline, estimate: Estimate, terms: Sequence[Term], jacobian: Jacobian, count: int
+) -> list[Term]:
     """Keep the terms with the best score tests; a machine that is known needs no other poles for any of them."""
 
     def best(term: Term) -> float:

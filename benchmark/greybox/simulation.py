@@ -13,7 +13,7 @@ from numba import cfunc
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body_directly, run_tanks_directly, transition
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
-from simgap.greybox.machine_kernel import run_machine_directly
+from simgap.greybox.machine_kernels import run_machine_directly
 from simgap.greybox.plant import Plant
 from simgap.greybox.two_masses import ENTRY
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from reprlib import repr as short
 from typing import Any
 
 import numpy as np
 
 from simgap.known_plant import Known, KnownPlant
-from simgap.records import Channels, Experiment, UnusableInput
+from simgap.records import Channels, Dataset, Experiment, UnusableInput
 
 KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled", "gravity", "hangs_at",
         "ticks_per_turn", "controller")  # fmt: skip
@@ -116,6 +117,16 @@ def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels
             raise UnusableInput(
                 f"{where}: [plant]: the column {short(plant.enabled)} of {x.name} must hold 0 (off) and 1 (on) only"
             )
+
+
+def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
+    """Say of a data set what is known of its machine, as a table [plant] would. Raises UnusableInput."""
+    if not table:
+        return dataset
+    channels = replace(dataset.channels, plant=read_plant(table, dataset.channels, dataset.name))
+    training = dataset.training
+    check_records(channels.plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name)
+    return replace(dataset, training=replace(training, channels=channels), channels=channels)
 
 
 def parse_known(options: Sequence[str], where: str = "--known") -> dict[str, Any]:

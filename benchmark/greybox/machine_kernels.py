@@ -19,7 +19,7 @@ _places, _terms = types.int64[::1], types.UniTuple(types.FunctionType(TERM), SLO
     ),
     cache=True, nogil=True,
 )  # fmt: skip
-def run_machine(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
+def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
     loop, goal, gain, supply, enabled, inertias, weights, numbers, start, substeps, h,
     terms, until, theta, p_at, m_at, memory, commands, c_at, n_commands, states,
 ):  # fmt: skip
