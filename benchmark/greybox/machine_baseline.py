@@ -75,7 +75,7 @@ def spread(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> 
 
 
 def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -> Estimate:
-    """Fit a machine without effects, from the best of a grid of its natural frequency, damping and inertia, or from `start`."""
+    """Fit a machine without effects from `start`, or the best of a grid of its frequency, damping and inertia."""
     machine = plant.machine
     assert machine is not None
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))

@@ -21,7 +21,10 @@ SLOWEST = 1e-6  # share of a sample's change by which a tank empties that counts
 
 
 def softened(errors: np.ndarray, soft: float) -> np.ndarray:
-    """Return z with z^2 = 2 s^2 (sqrt(1 + (e / s)^2) - 1): e^2 where e is small, 2 s |e| where it is large (Huber 1964)."""
+    """Return z with z^2 = 2 s^2 (sqrt(1 + (e / s)^2) - 1).
+
+    That is e^2 where e is small and 2 s |e| where it is large (a smooth form of Huber, Annals of Math. Stat. 35, 1964).
+    """
     with np.errstate(over="ignore"):
         x = errors / soft
         return soft * x * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 + x * x)))

@@ -56,9 +56,8 @@ def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
         _check_table(controller, CONTROLLER_KEYS, f"{where}: controller", required=("goal",))
         if output.kind != "position":
             raise UnusableInput(f"{where}: a controller of a {output.kind} is not known here; leave it out")
-    for one, other in (("inertia", "area"),):
-        if one in table and other in table:
-            raise UnusableInput(f"{where}: {one} and {other} are the same number of two machines; leave one out")
+    if "inertia" in table and "area" in table:
+        raise UnusableInput(f"{where}: inertia and area are the same number of two machines; leave one out")
     known = {key: constant(table, key) for key in ("mass", "arm", "damping", "supply")}
     inertia = constant(table, "inertia") or constant(table, "area", "inertia")
     of_controller = {key: constant(controller or {}, key) for key in ("gain", "derivative")}
@@ -69,20 +68,7 @@ def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
             raise UnusableInput(f"{where}: {key} must be a number or an interval, not a column")
     if known["arm"] is not None and known["mass"] is None:
         raise UnusableInput(f"{where}: arm needs the mass that it carries; add mass, or give inertia")
-    drive = controller["goal"] if controller is not None else table.get("input")
-    if controller is not None and "input" in table:
-        raise UnusableInput(f"{where}: the goal of the controller is the input; leave input out")
-    if drive is None:
-        free = [name for name in inputs if name not in used]
-        if len(free) != 1:
-            raise UnusableInput(f"{where}: which input drives it? Write input = one of {', '.join(free or inputs)}")
-        drive = free[0]
-    drive = _column(drive, "goal" if controller is not None else "input", inputs, where, used)
-    unused = [name for name in inputs if name not in used]
-    if unused:
-        raise UnusableInput(
-            f"{where}: it does not say what {short(unused[0])} is; name it there, or take it out of the inputs"
-        )
+    drive = _drive(table, inputs, used, where)
     radian = _scale(output.unit, table.get("ticks_per_turn"), where)
     gravity = _gravity(table.get("gravity", False), known, output.unit, where)
     goal_unit = channels.inputs[inputs.index(drive)].unit
@@ -97,6 +83,26 @@ def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
         differentiates=bool(controller) and "derivative" in controller, **known, inertia=inertia, gravity=gravity,
         hangs_at=_number(table.get("hangs_at", 0.0), "hangs_at", where), radian=radian, goal_factor=factor,
     )  # fmt: skip
+
+
+def _drive(table: Mapping[str, Any], inputs: Sequence[str], used: list[str], where: str) -> str:
+    """Find the column of the goal or of the drive; every input must then be something."""
+    controller = table.get("controller")
+    drive = controller["goal"] if controller is not None else table.get("input")
+    if controller is not None and "input" in table:
+        raise UnusableInput(f"{where}: the goal of the controller is the input; leave input out")
+    if drive is None:
+        free = [name for name in inputs if name not in used]
+        if len(free) != 1:
+            raise UnusableInput(f"{where}: which input drives it? Write input = one of {', '.join(free or inputs)}")
+        drive = free[0]
+    drive = _column(drive, "goal" if controller is not None else "input", inputs, where, used)
+    unused = [name for name in inputs if name not in used]
+    if unused:
+        raise UnusableInput(
+            f"{where}: it does not say what {short(unused[0])} is; name it there, or take it out of the inputs"
+        )
+    return drive
 
 
 def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels: Channels, where: str) -> None:

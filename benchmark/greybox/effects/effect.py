@@ -171,7 +171,7 @@ class InputEffect(Effect):
     """An effect between the commanded input and the input that acts on the plant."""
 
     port: ClassVar[Port] = "input"
-    # On the command of a controller inside a machine, compiled: command(c, error, t, h, p, i, m, j) returns what is left.
+    # What is left of the command c of a controller inside a machine, compiled: command(c, error, t, h, p, i, m, j).
     command: ClassVar[Callable[..., float] | None] = None
     # Where in such a machine it may act: on the goal.
     on_goal: ClassVar[bool] = False
