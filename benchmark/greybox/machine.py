@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -34,10 +35,11 @@ class Machine:
     moment: float = 0.0
     drive: float = 1.0
     alike: bool = True  # the moment is the same in all records, so that one of an unknown body cannot be told from it
-    of_drive: int = field(init=False, default=0)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "of_drive", self.names.index(self.known.input))
+    @cached_property
+    def of_drive(self) -> int:
+        """The column of the goal, or of the drive."""
+        return self.names.index(self.known.input)
 
     @property
     def controlled(self) -> bool:

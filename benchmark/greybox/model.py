@@ -13,12 +13,14 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
+from simgap.greybox.machine import Machine
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant, PlantScales, Term
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
+from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 
 
@@ -141,7 +143,7 @@ class GreyBoxModel:
     """A model of a data set: one fitted plant for each of its outputs, or for a position with its velocity."""
 
     parts: ClassVar = (  # records in a saved model
-        FittedPlant, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
+        FittedPlant, Known, KnownPlant, Machine, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
     )  # fmt: skip
     saved_as: ClassVar = "greybox"
 

@@ -77,10 +77,12 @@ def select(baseline: Baseline, compared: Compared | None = None) -> Selection:
     """
     search = _Search(baseline, compared=dict(compared or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
-    trial = search.forward(trial, linear_only=True)
+    if baseline.plant.machine is None:
+        trial = search.forward(trial, linear_only=True)
     trial = search.forward(trial)
     trial = search.backward(trial)
-    trial = search.exchange(trial)
+    if baseline.plant.machine is None:  # the order of a known machine is no guess that an early choice rests on
+        trial = search.exchange(trial)
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.compared)
 
 
