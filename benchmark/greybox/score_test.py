@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
-from simgap.greybox.fitting import Estimate
+from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.machine import DAMPING
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import refit_from_poles
@@ -18,6 +19,7 @@ from simgap.registry import EFFECTS
 WORTH_A_REFIT = 2.0
 # Starts of an effect that are refitted: those with the best scores.
 STARTS = 2
+FIRST_STEPS = 8  # of a fit from each of many starts
 STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 
 
@@ -109,9 +111,24 @@ def extend(
     if not scored or scored[0][0] < WORTH_A_REFIT:
         return None
     begun = [(theta, local) for _, theta, local in scored[:STARTS]]
-    if plant.machine is not None and term.effect.port == "force":
-        begun += [(plant.machine.less_damped(theta), local) for theta, local in begun]
+    if plant.machine is not None and term.effect.role == "friction":
+        # The damping stood in for it, and no descent leads from much of the one to much of the other.
+        begun = begun[:1] + _without_damping(baseline, estimate, plant, term)
     return baseline.fit(plant.terms, begun, max_steps)
+
+
+def _without_damping(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Begin a friction from each of its starts with little damping that stays as it is; return the best ones."""
+    assert plant.machine is not None
+    problem, damping = baseline.problem(plant), np.arange(plant.size) == DAMPING
+    fits = [
+        descend(problem, plant.machine.less_damped(theta), local, damping, FIRST_STEPS, TOLERANCE)
+        for theta, local in started(estimate, plant, term)
+    ]
+    fits.sort(key=lambda fit: fit.squares)
+    return [(fit.theta, fit.local) for fit in fits[:STARTS]]
 
 
 def promising(
