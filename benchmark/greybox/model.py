@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.baseline import Baseline
+from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
@@ -45,7 +45,8 @@ class FittedPlant:
         if baseline.outliers:
             records = without_outliers(records, first.errors, baseline.outliers)
         records = replace(records, soft=baseline.train.soft)
-        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local)
+        tolerance = 1e-3 if start.plant.machine is None else TOLERANCE  # its many runs tell more than enough
+        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local, tolerance=tolerance)
         usual = usual_start(_forecasting(start.plant), estimate, records, baseline.noise, baseline.n_init)
         return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers, usual)
 

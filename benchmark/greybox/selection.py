@@ -27,6 +27,7 @@ BETTER = 1.0
 # Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
+PROMISING = 8  # effects of a known machine that are fitted at all
 FINALISTS_OF_MACHINE = 3
 MORE_STEPS = 8  # until they are compared again
 
@@ -64,6 +65,10 @@ class Selection:
     def without(self, term: Term) -> Trial:
         """Fit the chosen model again with one term less."""
         return self.only([other for other in self.trial.terms if other != term])
+
+    def has_compared(self, trial: Trial) -> bool:
+        """Tell whether a model with each candidate added was fitted already."""
+        return (frozenset(term.key for term in trial.terms), False) in self.compared
 
     def compare(self, trial: Trial) -> list[Trial]:
         """Fit and assess a model with each candidate added; what the selection has compared is not fitted again."""
@@ -204,7 +209,7 @@ def compare(
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
     finalists = FINALISTS
     if baseline.plant.machine is not None:
-        tried, finalists = promising(baseline, estimate, tried, jacobian, FINALISTS), FINALISTS_OF_MACHINE
+        tried, finalists = promising(baseline, estimate, tried, jacobian, PROMISING), FINALISTS_OF_MACHINE
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
     finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
