@@ -33,7 +33,9 @@ class FittedOn:
     @classmethod
     def of(cls, dataset: Dataset) -> FittedOn:
         """What a later simulation must know of a data set."""
-        return cls(dataset.name, dataset.sha256, dataset.training.dt, dataset.n_init, replace(dataset.channels, plant=None))
+        return cls(
+            dataset.name, dataset.sha256, dataset.training.dt, dataset.n_init, replace(dataset.channels, plant=None)
+        )
 
     @classmethod
     def read(cls, text: dict[str, Any]) -> FittedOn:
