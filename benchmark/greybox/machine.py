@@ -18,6 +18,7 @@ NAMES = ("inertia", "damping", "back_emf", "mass", "arm", "derivative", "stiffne
 INERTIA, DAMPING, BACK_EMF, MASS, ARM, DERIVATIVE, STIFFNESS = range(len(NAMES))
 SUBSTEPS = 2
 INF = math.inf
+FASTEST = 1.0  # rad in a sample, of a loop that is closed
 LESS = 0.1  # of the damping
 SMALL = 1e-3  # share of its usual size that a number near zero counts as
 
@@ -73,6 +74,12 @@ class Machine:
         values = [getattr(self.known, name, None) for name in NAMES]
         numbers = [0.0 if v is None or v.column else v.value for v in values]
         return np.clip(numbers, [p.low for p in self.parameters], [p.high for p in self.parameters])
+
+    def largest_gain(self, dt: float) -> float:
+        """Return the gain of a loop that is faster than any sampling shows; a faster one is as good as infinite."""
+        inertia = (self.moment or (self.known.inertia.value if self.known.inertia is not None else 1.0)) or 1.0
+        usual = 1.0 if math.isnan(inertia) else inertia
+        return usual * self.known.radian * (FASTEST / dt) ** 2 / self.drive if self.controlled else INF
 
     def shapes(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " 7"]]:
         """List machines of less or more inertia and damping than this one, for fits that may have gone astray."""

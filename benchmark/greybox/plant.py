@@ -239,7 +239,10 @@ class Plant:
                 linear[machines.STIFFNESS] = Parameter.absent("stiffness")
         elif (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
             linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
-        linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.layout.gains.stop - self.layout.gains.start)]
+        largest = self.machine.largest_gain(self.dt) if self.machine is not None else inf
+        linear += [
+            Parameter(f"b{i}", "", -largest, largest) for i in range(self.layout.gains.stop - self.layout.gains.start)
+        ]
         linear += [Parameter("d", "", -inf, inf)] * self.offset
         linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
         linear += [Parameter("g", "", -inf, inf)] * self.two_outputs

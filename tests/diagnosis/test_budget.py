@@ -150,6 +150,6 @@ def test_a_run_in_which_a_known_machine_stuck_is_named():
     y[7] = 0.0
     runs = [Experiment(f"run_{i}", u[i], y[i], 0.1) for i in range(12)]
     channels = Channels((Channel("r"),), (Channel("q", "rad", "position"),), KnownPlant("r"))
-    dataset = Dataset("arm", TrainingSet(runs[:9], (), 5, channels), runs[9:], 5, channels)
+    dataset = Dataset("arm", TrainingSet(tuple(runs[:9]), (), 5, channels), tuple(runs[9:]), 5, channels)
     (said,) = odd_runs(Follows(), dataset)
     assert said.startswith("The run run_7 is explained by no model")
