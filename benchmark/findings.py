@@ -171,6 +171,13 @@ class Budget:
     learnable: float
     floor: float | None
     unexplained: float
+    # Of a known machine: the mean absolute error of the plain model ("") and with each cause on top of those before it.
+    mean_absolute_errors: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what stands under the name of the output."""
+        left_out = {"output"} if self.mean_absolute_errors else {"output", "mean_absolute_errors"}
+        return {key: value for key, value in vars(self).items() if key not in left_out}
 
 
 @dataclass(frozen=True)
@@ -230,7 +237,7 @@ class Findings:
             "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
             "gain": vars(self.gain),
-            "budget": {b.output: {k: v for k, v in vars(b).items() if k != "output"} for b in self.budget},
+            "budget": {b.output: b.to_json() for b in self.budget},
             "kinds": {name: {"kind": kind, "from": self.kinds_from.get(name)} for name, kind in self.kinds.items()},
             "doubts": list(self.doubts),
             "checks": list(self.checks),

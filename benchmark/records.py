@@ -10,6 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from simgap.known_plant import KnownPlant
+
 Kind = Literal["position", "velocity", "level", "other"]
 KindFrom = Literal["written", "header", "option", "evidence", "unknown"]
 Status = Literal["ok", "diverged", "error", "timeout"]
@@ -51,10 +53,11 @@ class Channel:
 
 @dataclass(frozen=True)
 class Channels:
-    """The columns of `u` and of `y`, in order."""
+    """The columns of `u` and of `y`, in order, and what is known of the machine between them."""
 
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
+    plant: KnownPlant | None = field(default=None, compare=False)
 
     @classmethod
     def unnamed(cls, nu: int, ny: int) -> Channels:

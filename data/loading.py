@@ -11,6 +11,7 @@ from typing import Any
 from simgap.data.formats.folder import load_folder
 from simgap.data.formats.headings import find, listed
 from simgap.data.formats.one_record import Choices, dataset_of, record_of
+from simgap.data.formats.plant_table import with_known
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
@@ -49,6 +50,7 @@ def load(
     kind: Kinds = None,
     resample: float | None = None,
     split_gaps: bool = False,
+    known: Mapping[str, Any] | None = None,
 ) -> Dataset:
     """Load a data set: a registered name, a folder with dataset.toml, a file of one record or a pandas DataFrame.
 
@@ -56,9 +58,10 @@ def load(
     without the unit that stands there. The sampling time is that of the time column or `dt` in seconds, and the record
     is split in time 60/20/20. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
     `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap.
+    `known` is what a table [plant] of a dataset.toml says of the machine, {"mass": "0.5 kg"}.
     Raises UnusableInput when the data cannot be used, and its subclass Missing when they are not at hand.
     """
-    return read(source, inputs, outputs, dt, name, kind, resample, split_gaps).dataset
+    return read(source, inputs, outputs, dt, name, kind, resample, split_gaps, known).dataset
 
 
 def read(
@@ -70,16 +73,17 @@ def read(
     kind: Kinds = None,
     resample: float | None = None,
     split_gaps: bool = False,
+    known: Mapping[str, Any] | None = None,
 ) -> Reading:
     """Load a data set as `load` does, and say in words what was inferred, cut or interpolated."""
     choices = Choices(inputs, outputs, dt, name, resample, split_gaps)
-    known = _known(source, choices)
-    if known is not None:
-        return Reading(with_kinds(known, kind))
+    described = _known(source, choices)
+    if described is not None:
+        return Reading(with_known(with_kinds(described, kind), known))
     table = _table(source, choices)
     name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
     dataset, said = dataset_of(table, choices, name)
-    dataset = with_kinds(dataset, kind)
+    dataset = with_known(with_kinds(dataset, kind), known)
     return Reading(dataset, (*told(dataset.channels), *said))
 
 

@@ -11,6 +11,7 @@ from simgap.cli.options import (
     Inputs,
     Json,
     KindOf,
+    KnownOf,
     Outputs,
     Resample,
     SamplingTime,
@@ -29,6 +30,7 @@ def diagnose(
     kind: KindOf = None,
     resample: Resample = None,
     split_gaps: SplitGaps = False,
+    known: KnownOf = None,
     seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
@@ -39,7 +41,7 @@ def diagnose(
     from simgap.saved.archive import save_model
 
     check_writable(json, html, save)
-    dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
+    dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known)
     answer = diagnose(dataset, seed=seed, profiles=html is not None)
     if json is not None:
         write_json(json, answer.to_json())

@@ -13,6 +13,7 @@ from simgap.cli.options import (
     Inputs,
     Json,
     KindOf,
+    KnownOf,
     Outputs,
     Resample,
     SamplingTime,
@@ -42,6 +43,7 @@ def fit(
     kind: KindOf = None,
     resample: Resample = None,
     split_gaps: SplitGaps = False,
+    known: KnownOf = None,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
     save: Annotated[Path | None, typer.Option(help="Write the fitted model into this file.")] = None,
@@ -63,7 +65,7 @@ def fit(
     console = Console()
     try:
         fitting.check_params(model, params)  # first, because data may take seconds to load
-        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
+        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known)
         with _progress(console):
             done = fitting.fit(model, dataset, params, seed)
     except (UnusableInput, KeyboardInterrupt, OSError):

@@ -25,6 +25,10 @@ KindOf = Annotated[
 Resample = Annotated[
     float | None, typer.Option("--resample", metavar="DT", help="Interpolate onto an even grid of DT seconds.")
 ]
+KnownOf = Annotated[
+    list[str] | None,
+    typer.Option("--known", help="What is known of the machine: mass=0.5kg, arm=0.1m, controller.goal=r; repeatable."),
+]
 SplitGaps = Annotated[bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time.")]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the same for machines into this file.")]
 
@@ -69,11 +73,14 @@ def read_data(
     kind: Sequence[str] | None = None,
     resample: float | None = None,
     split_gaps: bool = False,
+    known: Sequence[str] | None = None,
 ) -> Dataset:
     """Load the data of a command and print in one line what was inferred, if anything was. Raises UnusableInput."""
     from simgap.data import read
+    from simgap.data.formats.plant_table import parse_known
 
-    reading = read(data, inputs or (), outputs or (), dt, None, parse_kinds(kind or ()), resample, split_gaps)
+    kinds, machine = parse_kinds(kind or ()), parse_known(known or ())
+    reading = read(data, inputs or (), outputs or (), dt, None, kinds, resample, split_gaps, machine)
     if str(reading):
         typer.echo(str(reading))
     return reading.dataset

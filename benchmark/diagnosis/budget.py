@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -48,10 +49,13 @@ def budgets(
     learnable = np.maximum(of_named - _mse(dataset, learnt), 0.0) / of_plain
     floor = _floor(model, dataset, after)
     causes: dict[int, dict[str, float]] = {}
+    errors: dict[int, dict[str, float]] = {}
     for plant in named.named if named else ():
-        causes |= _causes(plant, of_plain, dataset)
+        runs = [[plant_of.simulate_anew(x, n) for x in dataset.test] for plant_of in _with_ever_more(plant)]
+        causes |= _causes(plant, of_plain, dataset, runs)
+        errors |= _absolute(plant, dataset, [before, *runs])
     rounding = (SMALLEST_ERROR * sizes_of(np.concatenate([x.y for x in dataset.test]))) ** 2
-    return tuple(
+    divided = tuple(
         _divided(
             channel.name, causes.get(j, {}), float(learnable[j]), None if floor is None else floor[j] / of_plain[j]
         )
@@ -59,6 +63,7 @@ def budgets(
         else _divided(channel.name, causes.get(j, {}), math.nan, None)
         for j, channel in enumerate(dataset.channels.outputs)
     )
+    return tuple(replace(one, mean_absolute_errors=errors.get(j, {})) for j, one in enumerate(divided))
 
 
 def _divided(output: str, causes: dict[str, float], learnable: float, floor: float | None) -> Budget:
@@ -71,17 +76,31 @@ def _divided(output: str, causes: dict[str, float], learnable: float, floor: flo
     return Budget(output, causes, learnable, floor, left - (floor or 0.0))
 
 
-def _causes(plant: Evidence, plain: np.ndarray, dataset: Dataset) -> dict[int, dict[str, float]]:
+def _causes(plant: Evidence, plain: np.ndarray, dataset: Dataset, runs: Sequence[Runs]) -> dict[int, dict[str, float]]:
     """Compute for each output of a plant the share of each of its causes, in the order in which they are listed."""
     outputs = list(plant.identified.plant.outputs)
-    effects = [effect for effect, _ in plant.names]
-    keys = [f"{effect}:{channel}" if effects.count(effect) > 1 else effect for effect, channel in plant.names]
-    errors = [plain[outputs], *(_plant_mse(model, dataset) for model in _with_ever_more(plant))]
+    keys = _keys(plant)
+    errors = [plain[outputs], *(_mse(dataset, of_model, outputs) for of_model in runs)]
     taken = [(a - b) / plain[outputs] for a, b in pairwise(errors)]
     return {
         output: {key: float(share[j]) for key, share in zip(keys, taken, strict=True)}
         for j, output in enumerate(outputs)
     }
+
+
+def _keys(plant: Evidence) -> list[str]:
+    effects = [effect for effect, _ in plant.names]
+    return [f"{effect}:{channel}" if effects.count(effect) > 1 else effect for effect, channel in plant.names]
+
+
+def _absolute(plant: Evidence, dataset: Dataset, runs: Sequence[Runs]) -> dict[int, dict[str, float]]:
+    """Compute the mean absolute errors of a known machine, without causes ("") and with ever more of them."""
+    if plant.channels.plant is None:
+        return {}
+    output, n = plant.identified.plant.outputs[0], dataset.n_init
+    y = np.concatenate([x.y[n:, output] for x in dataset.test])
+    errors = [float(np.mean(np.abs(np.concatenate([r.reshape(len(r), -1)[:, 0] for r in one]) - y))) for one in runs]
+    return {output: dict(zip(["", *_keys(plant)], errors, strict=True))}
 
 
 def _with_ever_more(plant: Evidence) -> Iterator[FittedPlant]:
@@ -90,11 +109,6 @@ def _with_ever_more(plant: Evidence) -> Iterator[FittedPlant]:
     yield from [plant.identified.plain] * outliers
     for count in range(1, len(plant.terms) + 1):
         yield promises.only(plant, plant.terms[:count]).identified.plant
-
-
-def _plant_mse(plant: FittedPlant, dataset: Dataset) -> Float[np.ndarray, " ny"]:
-    runs = [plant.simulate_anew(x, dataset.n_init) for x in dataset.test]
-    return _mse(dataset, runs, list(plant.outputs))
 
 
 def _mse(dataset: Dataset, runs: Runs, outputs: Sequence[int] | slice = slice(None)) -> Float[np.ndarray, " ny"]:

@@ -34,7 +34,7 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
         values = np.unique(y)
         if 3 <= len(values) < 0.05 * len(y) and len(values) < 500:
             sentences.append(f"{channel.name} takes only {len(values)} different values: its resolution is coarse.")
-    for i, channel in enumerate(dataset.channels.inputs):
+    for i, channel in enumerate(dataset.channels.inputs if dataset.channels.plant is None else ()):
         u = np.concatenate([x.u[:, i] for x in training.train])
         if u.min() >= 0 or u.max() <= 0:
             sentences.append(

@@ -12,6 +12,7 @@ import numpy as np
 from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.budget import budgets
+from simgap.diagnosis.odd_runs import odd_runs
 from simgap.error_views.views import views
 from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
 from simgap.greybox.data_checks import check_numbers
@@ -74,6 +75,7 @@ def diagnose(
         verdict = "named" if promised.causes else "suspected"
     if verdict == "nothing_found":
         doubt = doubt or unsaid_kinds.undecided(identified, dataset.channels)
+    model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     findings = Findings(
         dataset=dataset.name,
         verdict=verdict,
@@ -89,7 +91,11 @@ def diagnose(
         kinds={channel.name: channel.kind for channel in dataset.channels.outputs},
         kinds_from={channel.name: channel.kind_from for channel in dataset.channels.outputs},
         doubts=doubt,
-        checks=(*unsaid_kinds.taken_for(identified, dataset.channels), *checks.limitations(dataset)),
+        checks=(
+            *odd_runs(model, dataset),
+            *unsaid_kinds.taken_for(identified, dataset.channels),
+            *checks.limitations(dataset),
+        ),
         left=left,
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, promised.after if promised else before),
@@ -97,7 +103,6 @@ def diagnose(
         suspects=promised.suspects if promised else (),
         budget=budgets(promised, plain, dataset, before, seed) if views_too else (),
     )
-    model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     return Diagnosis(findings, time.perf_counter() - begin, model)
 
 

@@ -11,8 +11,7 @@ from simgap.diagnosis import gains, unsaid_kinds
 from simgap.findings import Cause, Gain
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import Term
-from simgap.greybox.selection import MAX_TERMS
+from simgap.greybox.plant import MAX_TERMS, Term
 from simgap.records import Dataset
 
 # Of what a search that did not end by itself takes of the error: the least that the effects it rests on must take.
@@ -31,22 +30,22 @@ class Promise:
     gain: Gain
 
 
-def trusted(shares: Sequence[float]) -> int:
+def trusted(shares: Sequence[float], most: int = MAX_TERMS) -> int:
     """Count the effects that a search rests on, by the share of the error that each takes on top of those before it.
 
     A search that was stopped at the largest number of effects might have gone on. It is trusted where less than half
     of them take nearly all of the error that it takes; the others may stand for anything.
     """
-    if len(shares) < MAX_TERMS:
+    if len(shares) < most:
         return len(shares)
     taken = np.cumsum(shares)
     enough = 1 + int(np.argmax(taken >= MOST * taken[-1]))
-    return enough if enough < MAX_TERMS / 2 else 0
+    return enough if enough < most / 2 else 0
 
 
 def rests_on(plant: Evidence) -> Evidence | None:
     """Return the evidence with those effects only that the search rests on; None where it rests on none it found."""
-    count = trusted(plant.shares)
+    count = trusted(plant.shares, plant.selection.baseline.plant.most_terms)
     return only(plant, plant.terms[:count]) if count or not plant.terms else None
 
 

@@ -170,7 +170,10 @@ class Evidence:
 
     def _rivals(self, term: Term, without: Trial) -> list[Rival]:
         """What could stand in the place of an effect, the nearest first; the other effects stay."""
-        rivals = []
+        rivals: list[Rival] = []
+        # A known machine has many runs, and only what the search came by is compared.
+        if self.selection.baseline.plant.machine is not None and not self.selection.has_compared(without):
+            return rivals
         for trial in self.selection.compare(without):
             new = [t for t in trial.terms if t not in without.terms]
             other = bool(new) and not new[0].replaces(term) and new[0].effect.name != term.effect.name
@@ -182,7 +185,8 @@ class Evidence:
     def _channel(self, term: Term) -> str:
         """The name of the input or output that an effect sits on; empty for a force."""
         if term.effect.port == "input":
-            return self.channels.inputs[term.channel].name
+            inputs = self.channels.inputs  # after the last of them, the command of a controller inside
+            return inputs[term.channel].name if term.channel < len(inputs) else "controller"
         outputs = self.identified.plant.outputs
         return self.channels.outputs[outputs[term.channel]].name if term.effect.port == "output" else ""
 

@@ -12,6 +12,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.linear_rival import linear_rival
+from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
 from simgap.greybox.plant import plants_of
@@ -53,8 +54,10 @@ def identify(data: TrainingSet) -> list[Identified]:
         settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
         selection = _selected(data, of_kind, outputs, settled)
-        selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
-        linear = linear_rival(data, of_kind, selection)
+        linear = None
+        if channels.plant is None:
+            selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
+            linear = linear_rival(data, of_kind, selection)
         best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
         identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
     return identified
@@ -75,6 +78,8 @@ def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], s
     The error of a model that knows no delay is large for one sample after every step, as that of a bad reading.
     """
     whole = data.train, data.valid, channels, outputs, data.n_init
+    if channels.plant is not None:
+        return select(find_machine_baseline(*whole))
     selection = select(settled.baseline, settled.compared) if settled else select(find_baseline(*whole))
     baseline, chosen = selection.baseline, selection.trial.estimate
     if baseline.outliers and chosen.plant.terms:

@@ -46,13 +46,16 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     plant, problem = estimate.plant, Problem(estimate.plant, records, white(records.sizes))
     n, order = len(records.u), plant.order
     x, v = problem.simulator.motion(estimate.theta, estimate.local)  # [E, T]
-    names, phi = library(plant, x, v, records.u)
+    driven = records.u if plant.machine is None else records.u[:, :, [plant.machine.of_drive]]
+    names, phi = library(plant, x, v, driven)
     plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs,
                   joint=plant.joint)  # fmt: skip
     simulator = Simulator(plain, np.ascontiguousarray(phi))
     theta = np.zeros(plain.size)
-    for part in ("poles", "zeros", "velocity"):
+    for part in ("poles", "zeros", "velocity") if plant.machine is None else ():
         theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
+    if plant.machine is not None:  # as linear as it is where it hangs
+        theta[: plant.order] = -plant.matrix(estimate.theta)[-1, ::-1]
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
     responses = np.moveaxis(

@@ -19,9 +19,10 @@ BEYOND = 0.1
 def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> Baseline | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
-    What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear model itself, of few
-    parameters, and is believed as long as more of them hardly help. None too for an output that is no motion and no
-    level, whose plain model is this one already, and where effects are of single experiments and cannot be forecast.
+    What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear
+    model itself, of few parameters, and is believed as long as more of them hardly help. None too for an output that is
+    no motion and no level, whose plain model is this one already, and where effects are of single experiments and
+    cannot be forecast.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
     if plain.plant.kind == "other" or len(plain.outputs) > 1 or chosen.plant.per_experiment:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.baseline import Baseline
+from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
+from simgap.greybox.machine import Machine
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant, PlantScales, Term
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
+from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 
 
@@ -42,7 +44,9 @@ class FittedPlant:
         first = descend(Problem(start.plant, records, baseline.noise), start.theta, fixed=fixed)
         if baseline.outliers:
             records = without_outliers(records, first.errors, baseline.outliers)
-        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local)
+        records = replace(records, soft=baseline.train.soft)
+        tolerance = 1e-3 if start.plant.machine is None else TOLERANCE  # its many runs tell more than enough
+        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local, tolerance=tolerance)
         usual = usual_start(_forecasting(start.plant), estimate, records, baseline.noise, baseline.n_init)
         return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers, usual)
 
@@ -124,7 +128,7 @@ class FittedPlant:
                 y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
         if self.outliers:
             error = experiment.y[n_init:, outputs] - y_hat
-            flags = flag(error[None], np.ones((1, len(error)), dtype=bool))[0]
+            flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
             for j in (outliers.output for outliers in self.outliers):
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat
@@ -140,7 +144,7 @@ class GreyBoxModel:
     """A model of a data set: one fitted plant for each of its outputs, or for a position with its velocity."""
 
     parts: ClassVar = (  # records in a saved model
-        FittedPlant, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
+        FittedPlant, Known, KnownPlant, Machine, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
     )  # fmt: skip
     saved_as: ClassVar = "greybox"
 

@@ -15,6 +15,8 @@ from simgap.greybox.samples import Records
 
 FAR = 6.0  # robust standard deviations; Gaussian noise goes there twice in 1e9 readings
 FEWEST = 3
+APART = 3.0  # times the next smaller one: what stands apart from all others
+RARE = 0.01  # of the readings
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +28,19 @@ class Outliers:
     size: float
     share: float
     log_likelihood_ratio: float
+    least: float = 0.0  # what is less far off belongs to the others
 
 
-def flag(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
-    """Flag readings whose error stands out from the median of the five around it."""
-    return _far(_off(errors, mask), mask)
+def flag(
+    errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], outliers: Sequence[Outliers] = ()
+) -> Bool[np.ndarray, "E T ny"]:
+    """Flag readings whose error stands out from the median of the five around it, as far as the outliers' least do."""
+    off = _off(errors, mask)
+    flags = _far(off, mask)
+    for one in outliers:
+        if one.least:
+            flags[:, :, one.output] = np.abs(off[:, :, one.output]) > one.least
+    return flags
 
 
 def _far(off: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T ny"]:
@@ -81,6 +91,27 @@ def find_outliers(
     return outliers
 
 
+def find_glitches(errors: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> list[Outliers]:
+    """Find outputs with single readings that are farther off than all others by a gap, however the others are spread.
+
+    The errors of a plain model of many runs have heavy tails of their own, which hide what no machine could do.
+    """
+    off, found = _off(errors, mask), []
+    for j in range(errors.shape[2]):
+        alone, e = np.abs(off[:, :, j][mask]), errors[:, :, j][mask]
+        largest = np.sort(alone)[::-1][: max(FEWEST + 1, int(RARE * len(alone)))]
+        ratios = largest[:-1] / np.maximum(largest[1:], 1e-12 * largest[0] + 1e-300)
+        count = int(np.argmax(ratios)) + 1
+        if count < FEWEST or count + 1 >= len(largest) or ratios[count - 1] < APART or not largest[0] > 0:
+            continue
+        least = float(np.sqrt(largest[count - 1] * largest[count]))
+        bad = alone > least
+        share = 1 - float(np.sum(e[~bad] ** 2) / np.sum(e**2))
+        size, ratio = float(np.sqrt(np.mean(alone[bad] ** 2))), _two_sizes(alone[alone > 0], bad[alone > 0])
+        found.append(Outliers(j, count / len(e), size, share, ratio, least))
+    return found
+
+
 def _two_sizes(e: Float[np.ndarray, " N"], bad: Bool[np.ndarray, " N"]) -> float:
     """Log-likelihood of errors of two sizes against that of one size, all of them normal."""
     n, count = len(e), int(bad.sum())
@@ -98,5 +129,5 @@ def _heavy_tails(e: Float[np.ndarray, " N"]) -> float:
 
 def without_outliers(records: Records, errors: Float[np.ndarray, "E T ny"], outliers: Sequence[Outliers]) -> Records:
     """Mask the readings that are off."""
-    flags = flag(errors, records.mask)[:, :, [o.output for o in outliers]].any(axis=2)
+    flags = flag(errors, records.mask, outliers)[:, :, [o.output for o in outliers]].any(axis=2)
     return replace(records, mask=records.mask & ~flags)

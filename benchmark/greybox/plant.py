@@ -11,8 +11,9 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Bool, Float
 
+from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
-from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
 from simgap.greybox.samples import OFFSET
 from simgap.records import Channels, Kind
 
@@ -20,6 +21,8 @@ from simgap.records import Channels, Kind
 FASTEST_TANK = 5.0
 FASTEST = 1e6
 SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
+MAX_TERMS = 5  # that a search may find
+MOST_OF_A_MACHINE = 8
 
 
 def plants_of(channels: Channels) -> list[tuple[int, ...]]:
@@ -82,7 +85,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Plant:
-    """A linear plant of given order with the effects on it.
+    """A linear plant of given order, or a known machine, with the effects on it.
 
     Companion form (all kinds but level), z = (x, x', ..), the product of sections s^2 + a1 s + a0 and s + a:
 
@@ -109,11 +112,36 @@ class Plant:
     scales: PlantScales | None = None  # needed as soon as there are terms
     terms: tuple[Term, ...] = ()
     joint: two_masses.Side = ""
+    machine: machines.Machine | None = None  # of which something is known; its numbers stand where the poles do
 
     @property
     def ny(self) -> int:
         """Number of outputs."""
         return 1 + self.two_outputs
+
+    @property
+    def input_channels(self) -> Sequence[int]:
+        """Where effects of an input act: on each input, or on the goal of a controller and, as nu, on its command."""
+        if self.machine is None:
+            return range(self.nu)
+        return (self.machine.of_drive, self.nu) if self.machine.controlled else (self.machine.of_drive,)
+
+    def takes(self, effect: Effect, channel: int) -> bool:
+        """Tell whether an effect may act there: on the goal of a controller few do, on its command those that can.
+
+        The conditions of a known machine differ from run to run, and a drift of each run's own would stand for them.
+        """
+        if self.machine is None:
+            return True
+        if not isinstance(effect, InputEffect) or not self.machine.controlled:
+            known = bool(self.machine.known.gravity) and effect.replaces_spring
+            return not known and effect.time_power is None
+        return effect.command is not None if channel == self.nu else effect.on_goal
+
+    @property
+    def most_terms(self) -> int:
+        """Effects that a search may find: more of a machine whose constants it need not find as well."""
+        return MAX_TERMS if self.machine is None else MOST_OF_A_MACHINE
 
     @property
     def sign_hidden(self) -> bool:
@@ -142,8 +170,9 @@ class Plant:
     @cached_property
     def layout(self) -> Layout:
         """Where each part of theta stands."""
-        poles = two_masses.WIDTH if self.joint else self.order
-        widths = [poles, self.nu * len(self.taps), int(self.offset), self.zeros, int(self.two_outputs)]
+        poles = two_masses.WIDTH if self.joint else len(machines.NAMES) if self.machine else self.order
+        gains = 1 if self.machine else self.nu * len(self.taps)
+        widths = [poles, gains, int(self.offset), self.zeros, int(self.two_outputs)]
         widths += [0 if t in self.per_experiment else len(self.parameters_of(t)) for t in self.terms]
         slices = [slice(end - width, end) for width, end in zip(widths, accumulate(widths), strict=True)]
         return Layout(*slices[:5], terms=tuple(slices[5:]))
@@ -207,9 +236,16 @@ class Plant:
         squared = [not self.cascade and i % 2 == 1 for i in range(self.order)]  # the a0 of each s^2 + a1 s + a0
         powers = two_masses.POWERS if self.joint else [1 + square for square in squared]
         linear = [Parameter(f"a{i}", "", 0.0, fastest**power) for i, power in enumerate(powers)]
-        if (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
+        if self.machine is not None:
+            linear = self.machine.parameters
+            if any(term.effect.replaces_spring for term in self.terms):
+                linear[machines.STIFFNESS] = Parameter.absent("stiffness")
+        elif (self.order == 2 or self.joint) and any(term.effect.replaces_spring for term in self.terms):
             linear[1] = Parameter("a1", "", 0.0, 0.0, fixed=True)
-        linear += [Parameter(f"b{i}", "", -inf, inf) for i in range(self.nu * len(self.taps))]
+        largest = self.machine.largest_gain(self.dt) if self.machine is not None else inf
+        linear += [
+            Parameter(f"b{i}", "", -largest, largest) for i in range(self.layout.gains.stop - self.layout.gains.start)
+        ]
         linear += [Parameter("d", "", -inf, inf)] * self.offset
         linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
         linear += [Parameter("g", "", -inf, inf)] * self.two_outputs
@@ -268,6 +304,8 @@ class Plant:
     @cached_property
     def substeps(self) -> int:
         """Substeps per sample: what the most demanding term asks for, or fewer where the plant is slow."""
+        if self.machine is not None:
+            return machines.SUBSTEPS
         if self.imposed:
             return 1
         asked = max((term.effect.substeps for term in self.terms), default=1)
@@ -277,6 +315,8 @@ class Plant:
     def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
         """Return A of z' = A z + (inputs and forces)."""
         sections, n = theta[self.layout.poles], self.order
+        if self.machine is not None:
+            return self.machine.linear(theta, n)
         if self.joint:
             return two_masses.matrix(sections)
         if self.cascade:

@@ -61,14 +61,16 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
     gains[plant.layout.gains] = gains[plant.layout.offset] = True
     tried = []
     few = plant.order <= 2
-    shapes = list(denominator_grid(plant, records, coarse=True)) if few else [
+    shapes = plant.machine.shapes(starts[0]) if plant.machine else list(
+        denominator_grid(plant, records, coarse=True)
+    ) if few else [
         [a * scale for a in starts[0][plant.layout.poles]] for scale in (0.25, 0.5, 1.0, 2.0)
     ]  # fmt: skip
     for shape in shapes:
         for start in starts:
             theta = start.copy()
             theta[plant.layout.poles] = shape
-            if not plant.imposed:
+            if not plant.imposed and plant.machine is None:
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
             tried.append(descend(problem, theta, fixed=~gains, max_steps=2, tolerance=1.0))
     tried.sort(key=lambda trial: trial.squares)

@@ -21,7 +21,7 @@ def with_kind(channels: Channels, output: int, kind: Kind) -> Channels:
     """Say of one output what the records show it to be."""
     outputs = list(channels.outputs)
     outputs[output] = replace(outputs[output], kind=kind, kind_from="evidence")
-    return Channels(channels.inputs, tuple(outputs))
+    return replace(channels, outputs=tuple(outputs))
 
 
 def with_velocity(data: TrainingSet) -> Channels:

@@ -20,6 +20,23 @@ MEMORIES = np.linspace(-1.0, 1.0, 9)  # from which the memory of a term may begi
 SLOWEST = 1e-6  # share of a sample's change by which a tank empties that counts as one at all
 
 
+def softened(errors: np.ndarray, soft: float) -> np.ndarray:
+    """Return z with z^2 = 2 s^2 (sqrt(1 + (e / s)^2) - 1).
+
+    That is e^2 where e is small and 2 s |e| where it is large (a smooth form of Huber, Annals of Math. Stat. 35, 1964).
+    """
+    with np.errstate(over="ignore"):
+        x = errors / soft
+        return soft * x * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 + x * x)))
+
+
+def softness(errors: np.ndarray, soft: float) -> np.ndarray:
+    """Compute dz / de of `softened`."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        root = np.sqrt(1.0 + (errors / soft) ** 2)
+        return np.nan_to_num(np.sqrt(0.5 * (1.0 + root)) / root)
+
+
 class Problem:
     """A plant with the records that it is fitted to, and the noise that weighs its errors."""
 
@@ -46,7 +63,7 @@ class Problem:
         if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR * self._sizes.min():  # nor when it is not a number
             largest = LARGEST_ERROR * self._sizes
             errors = np.clip(np.where(np.isnan(errors), largest, errors), -largest, largest)
-        return errors
+        return softened(errors, self.records.soft) if self.records.soft else errors
 
     def squares(self, errors: np.ndarray) -> float:
         """Sum the squares of the whitened errors, and what rounding adds to them."""
@@ -117,10 +134,12 @@ class Problem:
             locals_[1 + len(steps) + i, :, i] += step
         here, *there = self.simulator.run_many(thetas, locals_)
         m = here.shape[1] * here.shape[2]
+        soft = self.records.soft
+        weights = softness(self.records.y - here, soft) if soft else 1.0
 
         def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
             with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
-                change = np.where(self._measured, (moved - here) / step, 0.0)
+                change = np.where(self._measured, (moved - here) / step, 0.0) * weights
                 return self.noise.whiten(change).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
@@ -142,6 +161,8 @@ class Problem:
         One that is near zero has a share of what would be its size beside the others', in its own unit.
         """
         plant, layout, records = self.plant, self.plant.layout, self.records
+        if plant.machine is not None:
+            return self._with_terms(plant.machine.sizes(theta, records.duration, plant.order))
         poles = np.abs(theta[layout.poles])
         slowest, speed = 1 / records.duration, 1.0
         natural = np.empty(len(poles))
@@ -162,6 +183,11 @@ class Problem:
         sizes[layout.offset] = np.maximum(sizes[layout.offset], drive)
         sizes[layout.zeros] = np.maximum(sizes[layout.zeros], SMALL * plant.dt ** np.arange(1.0, 1 + plant.zeros))
         sizes[layout.velocity] = np.maximum(sizes[layout.velocity], SMALL * self._sizes[-1] / self._sizes[0] * plant.dt)
+        return self._with_terms(sizes)
+
+    def _with_terms(self, sizes: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+        """Give the parameters of terms that are near zero a share of where they usually start."""
+        plant = self.plant
         for term in plant.terms:
             if term in plant.per_experiment:
                 continue

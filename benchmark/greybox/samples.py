@@ -27,6 +27,7 @@ class Records:
     y: Float[np.ndarray, "E T ny"]
     mask: Bool[np.ndarray, "E T"]
     dt: float
+    soft: float = 0.0  # errors beyond it count by their size, not by its square; 0: all count by the square
 
     @classmethod
     def of(cls, experiments: Sequence[Experiment], outputs: Sequence[int]) -> Records:
@@ -65,11 +66,13 @@ class Records:
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
-        return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt)
+        return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt, self.soft)
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""
-        return Records(np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt)
+        return Records(
+            np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt, self.soft
+        )
 
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""
@@ -79,7 +82,7 @@ class Records:
             whole = values[:, : count * samples]
             return np.ascontiguousarray(whole.reshape(-1, samples, *values.shape[2:]))
 
-        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt)
+        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt, self.soft)
 
     @property
     def duration(self) -> float:

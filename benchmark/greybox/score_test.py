@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
-from simgap.greybox.fitting import Estimate
+from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.machine import DAMPING
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant, Term
 from simgap.greybox.pole_search import refit_from_poles
@@ -18,6 +19,7 @@ from simgap.registry import EFFECTS
 WORTH_A_REFIT = 2.0
 # Starts of an effect that are refitted: those with the best scores.
 STARTS = 2
+FIRST_STEPS = 8  # of a fit from each of many starts
 STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 
 
@@ -32,8 +34,8 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
         effect = EFFECTS[name]()
         if not effect.simulated or name in contained or (effect.time_power is not None and not baseline.repeated):
             continue
-        channels = {"input": plant.nu, "force": 1, "output": plant.ny}[effect.port]
-        on_channels = [Term(effect, channel) for channel in range(channels)]
+        channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
+        on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]
         listed += [
             t for t in on_channels
             if t.key not in taken and effect.applies_to(scales.of(t)) and effect.starts(scales.of(t))
@@ -62,7 +64,10 @@ def score(
         part, amplitude = plant.part_of(term), start.amplitude
         theta[part] = start.values
         with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
-            change = extended.simulator.run(theta, local) - without
+            if baseline.train.soft:
+                change = estimate.errors - extended.errors(theta, local)
+            else:
+                change = extended.simulator.run(theta, local) - without
         d = noise.whiten(np.where(baseline.train.mask[:, :, None], change, 0.0)).reshape(e.shape)
         if not (jacobian.finite and 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE):
             scored.append((0.0, theta, local))
@@ -93,7 +98,7 @@ def extend(
     plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
-    if term.effect.moves_poles:
+    if term.effect.moves_poles and plant.machine is None:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
         if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
@@ -105,7 +110,37 @@ def extend(
     scored = sorted(score(baseline, estimate, plant, term, jacobian), key=lambda scored: -scored[0])
     if not scored or scored[0][0] < WORTH_A_REFIT:
         return None
-    return baseline.fit(plant.terms, [(theta, local) for _, theta, local in scored[:STARTS]], max_steps)
+    begun = [(theta, local) for _, theta, local in scored[:STARTS]]
+    if plant.machine is not None and term.effect.role == "friction":
+        # The damping stood in for it, and no descent leads from much of the one to much of the other.
+        begun = begun[:1] + _without_damping(baseline, estimate, plant, term)
+    return baseline.fit(plant.terms, begun, max_steps)
+
+
+def _without_damping(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Begin a friction from each of its starts with little damping that stays as it is; return the best ones."""
+    assert plant.machine is not None
+    problem, damping = baseline.problem(plant), np.arange(plant.size) == DAMPING
+    fits = [
+        descend(problem, plant.machine.less_damped(theta), local, damping, FIRST_STEPS, TOLERANCE)
+        for theta, local in started(estimate, plant, term)
+    ]
+    fits.sort(key=lambda fit: fit.squares)
+    return [(fit.theta, fit.local) for fit in fits[:STARTS]]
+
+
+def promising(
+    baseline: Baseline, estimate: Estimate, terms: Sequence[Term], jacobian: Jacobian, count: int
+) -> list[Term]:
+    """Keep the terms with the best score tests; a machine that is known needs no other poles for any of them."""
+
+    def best(term: Term) -> float:
+        plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
+        return max((scored[0] for scored in score(baseline, estimate, plant, term, jacobian)), default=0.0)
+
+    return sorted(terms, key=best, reverse=True)[:count]
 
 
 def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:

@@ -14,7 +14,7 @@ from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.plant import Term
-from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of
+from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of, promising
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
 T = TypeVar("T")
@@ -24,10 +24,11 @@ R = TypeVar("R")
 CONFIRMED = 8.0
 # By how much the score of another choice of effects must be better to be preferred to the first one.
 BETTER = 1.0
-MAX_TERMS = 5
 # Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
+PROMISING = 8  # effects of a known machine that are fitted at all
+FINALISTS_OF_MACHINE = 3
 MORE_STEPS = 8  # until they are compared again
 
 Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
@@ -65,6 +66,10 @@ class Selection:
         """Fit the chosen model again with one term less."""
         return self.only([other for other in self.trial.terms if other != term])
 
+    def has_compared(self, trial: Trial) -> bool:
+        """Tell whether a model with each candidate added was fitted already."""
+        return (frozenset(term.key for term in trial.terms), False) in self.compared
+
     def compare(self, trial: Trial) -> list[Trial]:
         """Fit and assess a model with each candidate added; what the selection has compared is not fitted again."""
         return compare(self.baseline, trial.estimate, self.noise_order, dict(self.compared))
@@ -77,10 +82,12 @@ def select(baseline: Baseline, compared: Compared | None = None) -> Selection:
     """
     search = _Search(baseline, compared=dict(compared or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
-    trial = search.forward(trial, linear_only=True)
+    if baseline.plant.machine is None:
+        trial = search.forward(trial, linear_only=True)
     trial = search.forward(trial)
     trial = search.backward(trial)
-    trial = search.exchange(trial)
+    if baseline.plant.machine is None:  # the order of a known machine is no guess that an early choice rests on
+        trial = search.exchange(trial)
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.compared)
 
 
@@ -106,9 +113,9 @@ class _Search:
 
     def forward(self, trial: Trial, linear_only: bool = False) -> Trial:
         """Add the best effect, one after the other, while noise alone would not do as well."""
-        while len(trial.terms) < MAX_TERMS:
+        while len(trial.terms) < self.baseline.plant.most_terms:
             trials = compare(self.baseline, trial.estimate, self.noise_order, self.compared, linear_only)
-            if trials:
+            if trials and self.baseline.plant.machine is None:  # whose many free runs judge, not the next sample
                 best = min(trials, key=lambda trial: trial.estimate.squares).estimate
                 self.noise_order = schwarz_order(best.errors, self.baseline.train.mask, self.baseline.resolution)
                 trial = self._assess(trial.estimate)
@@ -135,7 +142,7 @@ class _Search:
 
         Where the search ran into the largest number of effects, no exchange makes them the explanation.
         """
-        for term in trial.terms if 1 < len(trial.terms) < MAX_TERMS else ():
+        for term in trial.terms if 1 < len(trial.terms) < self.baseline.plant.most_terms else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
             rest = self._without(trial, term)
@@ -200,9 +207,12 @@ def compare(
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
+    finalists = FINALISTS
+    if baseline.plant.machine is not None:
+        tried, finalists = promising(baseline, estimate, tried, jacobian, PROMISING), FINALISTS_OF_MACHINE
     begun = [fit for fit in in_threads(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _anew(baseline, estimate, _race(baseline, begun[:FINALISTS], worth))
+    finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
     compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
     return ranked(list(compared[key]))
 

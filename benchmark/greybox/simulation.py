@@ -12,6 +12,8 @@ from numba import cfunc
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body_directly, run_tanks_directly, transition
+from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
+from simgap.greybox.machine_kernels import run_machine_directly
 from simgap.greybox.plant import Plant
 from simgap.greybox.two_masses import ENTRY
 
@@ -48,6 +50,8 @@ class Simulator:
         # [nu, E, T * substeps]: each sample until the next one
         arriving = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)
         self._u = np.ascontiguousarray(arriving)
+        self._u_first = u[:, :1]
+        self._constants = self._of_machine(u) if plant.machine else None
         self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
         forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
@@ -70,6 +74,8 @@ class Simulator:
         plant, (experiments, samples, _) = self.plant, self.shape
         if plant.imposed:
             return np.stack([self._forces(*of_run) for of_run in zip(thetas, starts, strict=True)])
+        if plant.machine is not None:
+            return np.stack([self._machine(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
         e, g0, g1 = np.empty((3, s, n, n))
         rates = np.empty((s, n))
@@ -88,6 +94,37 @@ class Simulator:
         run(
             e, g0, g1, rates, entry, drives, np.ascontiguousarray(starts), self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
+        )  # fmt: skip
+        return states
+
+    def _of_machine(self, u: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Take gain, supply and enabled [E, T] from the columns of a machine."""
+        machine = self.plant.machine
+        assert machine is not None
+        known = machine.known
+        on = u[:, :, machine.names.index(known.enabled)] if known.enabled else np.ones(u.shape[:2])
+        columns = (machine.column(u, known.gain, 1.0), machine.column(u, known.supply, 1.0), on)
+        return tuple(np.ascontiguousarray(column) for column in columns)
+
+    def _machine(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E n"]) -> Float[np.ndarray, "E T n"]:
+        """Simulate a machine of which something is known."""
+        plant, machine = self.plant, self.plant.machine
+        assert machine is not None and self._constants is not None
+        gain, supply, on = self._constants
+        known, states = machine.known, np.empty((*self.shape[:2], plant.order))
+        goal = self.arriving(theta, machine.of_drive, start)
+        if machine.controlled and known.goal_factor != 1.0:
+            goal = goal * known.goal_factor
+        inertias, weights = machine.moments(self._u_first, theta)
+        of_command = plant.on("input", plant.nu)
+        commands = tuple(compiled(term.effect.command) for term in of_command)
+        c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * (SLOTS - len(of_command)))
+        numbers = np.array([*theta[[DAMPING, BACK_EMF, DERIVATIVE, STIFFNESS]], known.radian, known.hangs_at])
+        run_machine_directly(
+            machine.controlled, np.ascontiguousarray(goal), gain, supply * theta[plant.layout.gains.start], on,
+            inertias, weights, numbers, np.ascontiguousarray(start[:, : plant.order]), self.substeps, self.h,
+            self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, self._memory,
+            commands + (compiled(nothing),) * (SLOTS - len(commands)), c_at, len(commands), states,
         )  # fmt: skip
         return states
 
@@ -117,6 +154,8 @@ class Simulator:
     ) -> Float[np.ndarray, "E K"]:
         """Compute b u + d after the actuators' effects, for every substep; `start` is what these remember."""
         plant = self.plant
+        if plant.machine is not None:
+            return self._torque(theta)
         gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
         total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
         for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
@@ -124,6 +163,15 @@ class Simulator:
             for tap, gain in zip(plant.taps, of_channel, strict=True):
                 total += gain * shifted(arriving, tap * self.substeps)
         return total
+
+    def _torque(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
+        """Compute what drives a machine: k V e u, or with a controller what the goal's distance from its mean asks."""
+        machine = self.plant.machine
+        assert machine is not None and self._constants is not None
+        gain, supply, on = (np.repeat(column, self.substeps, axis=1) for column in self._constants)
+        goal = self._u[machine.of_drive]
+        command = gain * (goal - goal.mean()) * machine.known.goal_factor if machine.controlled else goal
+        return theta[self.plant.layout.gains.start] * supply * on * command
 
     def arriving(
         self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,9 @@ class FittedOn:
     @classmethod
     def of(cls, dataset: Dataset) -> FittedOn:
         """What a later simulation must know of a data set."""
-        return cls(dataset.name, dataset.sha256, dataset.training.dt, dataset.n_init, dataset.channels)
+        return cls(
+            dataset.name, dataset.sha256, dataset.training.dt, dataset.n_init, replace(dataset.channels, plant=None)
+        )
 
     @classmethod
     def read(cls, text: dict[str, Any]) -> FittedOn:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from reprlib import repr as short
 from typing import Any, get_args
 
+from simgap.data.formats.plant_table import read_plant
 from simgap.records import LARGEST_VALUE, Channel, Channels, Kind, UnusableInput
 
 FILE = "dataset.toml"
 KINDS = get_args(Kind)
-KEYS = ("name", "sampling_time", "time", "n_init", "inputs", "outputs", "splits")
+KEYS = ("name", "sampling_time", "time", "n_init", "inputs", "outputs", "splits", "plant")
 CHANNEL_KEYS = ("name", "unit", "kind", "kind_from")
 NOT_WRITTEN = ("header", "option")  # where a saved kind came from, if nobody had written it
 SPLITS = ("train", "valid", "test")
@@ -41,6 +42,8 @@ def read_description(file: Path) -> Description:
     if n_init is not None and (type(n_init) is not int or not 1 <= n_init <= 2**31):
         raise UnusableInput(f"{file}: n_init must be a whole number of samples, 1 or more")
     channels = Channels(_channels(content["inputs"], "inputs", file), _channels(content["outputs"], "outputs", file))
+    if "plant" in content:
+        channels = replace(channels, plant=read_plant(content["plant"], channels, str(file)))
     time = _text(content["time"], "time", file) if "time" in content else None
     check_columns(columns_of(channels) + ((time,) if time else ()), str(file))
     splits = content["splits"]

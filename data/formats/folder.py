@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import FILE, Description, read_description
+from simgap.data.formats.plant_table import check_records
 from simgap.data.formats.sampling import check_time
 from simgap.data.splits import assemble, hold_out_tails
 from simgap.records import Dataset, Experiment, UnusableInput
@@ -20,6 +21,9 @@ def load_folder(folder: Path) -> Dataset:
     records = {
         split: tuple(_experiment(file, names[file], described) for file in found) for split, found in files.items()
     }
+    if described.channels.plant is not None:
+        every = [x for found in records.values() for x in found]
+        check_records(described.channels.plant, every, described.channels, str(folder / FILE))
     train = records["train"]
     if "valid" in records:
         valid = records["valid"]

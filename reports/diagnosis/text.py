@@ -37,6 +37,9 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
     for budget in findings.budget:
         title = f"Where the squared error of {budget.output} goes: shares of the plain model's on the test experiments"
         paragraphs += _section(title, _budget(budget, findings), width)
+        if budget.mean_absolute_errors:
+            title = f"Mean absolute error of {budget.output} on the test experiments, each cause beside those before it"
+            paragraphs += _section(title, _absolute(budget, findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
         share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
@@ -82,6 +85,17 @@ def _cause(cause: Cause, findings: Findings) -> Iterator[str]:
         yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."
     if decide := words.deciding(cause, findings):
         yield decide
+
+
+def _absolute(budget: Budget, findings: Findings) -> list[str]:
+    """List the mean absolute error of a known machine with ever more of its causes."""
+    unit, titles = findings.units[budget.output], words.titles_of(findings)
+    milli = unit in ("rad", "m")
+    return [
+        f"{value * (1000 if milli else 1):6.3g} {'m' * milli}{unit}  "
+        + (f"with {titles.get(name, name)}" if name else "plain model with what is known")
+        for name, value in budget.mean_absolute_errors.items()
+    ]
 
 
 def _budget(budget: Budget, findings: Findings) -> list[str]:

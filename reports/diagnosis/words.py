@@ -100,12 +100,17 @@ def runner_up(findings: Findings) -> str:
     return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
 
 
+def titles_of(findings: Findings) -> dict[str, str]:
+    """Map the names of causes in a budget to their titles."""
+    titles = {cause.effect: cause_title(cause, findings) for cause in findings.causes}
+    return titles | {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in findings.causes}
+
+
 def parts_of(budget: Budget, findings: Findings) -> list[tuple[str, float | None]]:
     """List the parts of an error budget with their shares: the causes, then what is left; empty where there is none."""
     if not math.isfinite(budget.unexplained):
         return []
-    titles = {cause.effect: cause_title(cause, findings) for cause in findings.causes}
-    titles |= {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in findings.causes}
+    titles = titles_of(findings)
     return [
         *((titles.get(name, name), share) for name, share in budget.causes.items()),
         ("learnable from the input, without a name", budget.learnable),

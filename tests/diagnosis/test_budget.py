@@ -11,8 +11,10 @@ from simgap.data.simulated.rigs import hide
 from simgap.diagnosis import gains
 from simgap.diagnosis.budget import budgets
 from simgap.diagnosis.diagnose import diagnose
+from simgap.diagnosis.odd_runs import odd_runs
 from simgap.diagnosis.repeats import repeated, variance_of_repeats
-from simgap.records import Experiment
+from simgap.known_plant import KnownPlant
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 
 def total(budget):
@@ -135,3 +137,19 @@ def test_the_json_has_the_budget_of_every_output(named):
     assert set(answer) == {"v"}
     assert set(answer["v"]) == {"causes", "learnable", "floor", "unexplained"}
     assert answer["v"]["floor"] is None
+
+
+def test_a_run_in_which_a_known_machine_stuck_is_named():
+    class Follows:
+        def simulate(self, u, y_init):
+            return u[:, y_init.shape[1] :]
+
+    rng = np.random.default_rng(0)
+    u = rng.normal(size=(12, 50, 1))
+    y = u + 0.01 * rng.normal(size=u.shape)
+    y[7] = 0.0
+    runs = [Experiment(f"run_{i}", u[i], y[i], 0.1) for i in range(12)]
+    channels = Channels((Channel("r"),), (Channel("q", "rad", "position"),), KnownPlant("r"))
+    dataset = Dataset("arm", TrainingSet(tuple(runs[:9]), (), 5, channels), tuple(runs[9:]), 5, channels)
+    (said,) = odd_runs(Follows(), dataset)
+    assert said.startswith("The run run_7 is explained by no model")

@@ -12,7 +12,7 @@ from simgap.diagnosis.promises import promise, trusted
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import identify
 from simgap.greybox.model import GreyBoxModel
-from simgap.greybox.selection import MAX_TERMS
+from simgap.greybox.plant import MAX_TERMS
 
 
 @pytest.fixture(scope="module")

@@ -51,6 +51,7 @@ class ActuatorLag(InputEffect):
         "pipe, the inner loop of a drive."
     )
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
+    on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 70
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     linear: ClassVar[bool] = True

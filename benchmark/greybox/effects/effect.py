@@ -39,6 +39,8 @@ class SignalScales:
     u_unit: str = ""
     y_unit: str = ""
     lines: tuple[float, ...] = ()  # Hz, frequencies at which the errors of all experiments agree
+    force: str = ""  # unit of the forces, where the inertia is known
+    commanded: bool = False  # the input is the command of a controller inside; x_max is then its largest error
     quantisation_step: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
 
     @property
@@ -66,6 +68,8 @@ class SignalScales:
     @property
     def force_unit(self) -> str:
         """Unit of the forces on the plant: that of the highest derivative."""
+        if self.force:
+            return self.force
         if self.order == 0:
             return self.y_unit
         return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
@@ -170,6 +174,10 @@ class InputEffect(Effect):
     """An effect between the commanded input and the input that acts on the plant."""
 
     port: ClassVar[Port] = "input"
+    # What is left of the command c of a controller inside a machine, compiled: command(c, error, t, h, p, i, m, j).
+    command: ClassVar[Callable[..., float] | None] = None
+    # Where in such a machine it may act: on the goal.
+    on_goal: ClassVar[bool] = False
 
     @staticmethod
     @abstractmethod

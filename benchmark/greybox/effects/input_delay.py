@@ -23,6 +23,7 @@ class InputDelay(InputEffect):
         "cycle."
     )
     reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
+    on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 10
     linear: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True

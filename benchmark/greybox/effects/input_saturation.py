@@ -47,6 +47,11 @@ class InputSaturation(InputEffect):
         return [Start((share * scales.u_max,)) for share in (0.9, 0.75, 0.55, 0.35)]
 
     @staticmethod
+    def command(c, error, t, h, p, i, m, j):
+        """Return the command of a controller clipped to -p[i] .. p[i]."""
+        return min(max(c, -p[i]), p[i])
+
+    @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u clipped to -p[0] .. p[0]."""
         return np.clip(u, -p[0], p[0])

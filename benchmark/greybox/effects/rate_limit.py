@@ -28,6 +28,7 @@ class RateLimit(InputEffect):
         "Klyde, McRuer, Myers, Pilot-induced oscillation analysis and prediction with actuator rate limiting, J. "
         "Guidance, Control and Dynamics 20, 1997, fig. 2 (fully developed rate limiting)"
     )
+    on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 55
     substeps: ClassVar[int] = 4
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band", "input")

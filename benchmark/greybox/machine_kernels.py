@@ -1,0 +1,86 @@
+"""The inner loop of a machine with a controller inside, compiled."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit, types
+
+from simgap.greybox.kernels import FORCE, FRICTION, OUTFLOW, RIM, SLOTS, STOP, TERM, dry_friction
+
+_row, _matrix, _cube = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_places, _terms = types.int64[::1], types.UniTuple(types.FunctionType(TERM), SLOTS)
+
+
+@njit(
+    types.void(
+        types.boolean, _matrix, _matrix, _matrix, _matrix, _row, _row, _row, _matrix, types.int64, types.float64,
+        _terms, _places, _row, _places, _places, _row, _terms, _places, types.int64, _cube,
+    ),
+    cache=True, nogil=True,
+)  # fmt: skip
+def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
+    loop, goal, gain, supply, enabled, inertias, weights, numbers, start, substeps, h,
+    terms, until, theta, p_at, m_at, memory, commands, c_at, n_commands, states,
+):  # fmt: skip
+    """Fill states [E, T, n], (q, q') or (q'), from start [E, n]: the equation of `Machine`, semi-implicit in q'.
+
+    goal [E, T * substeps] is r, or the drive; gain, supply (times the drive's gain) and enabled [E, T]. numbers:
+    damping, back-EMF, derivative, stiffness, radian, q0. Commands pass their terms in order, term(c, r - q, ..).
+    Dry friction is an impulse that brings the velocity nearest to zero, as in `run_body`.
+    """
+    damping, back_emf, derivative, stiffness, radian, rest = numbers
+    experiments, samples, n = states.shape
+    for experiment in range(experiments):
+        inertia, weight = inertias[experiment] * radian, weights[experiment]
+        q = start[experiment, 0] if n > 1 else 0.0
+        v = start[experiment, n - 1]
+        for i in range(len(memory)):
+            memory[i] = 0.0
+        step = 0
+        for k in range(samples):
+            if n > 1:
+                states[experiment, k, 0] = q
+            states[experiment, k, n - 1] = v
+            if k == samples - 1:
+                break
+            on = enabled[experiment, k]
+            d = damping + back_emf * on
+            scale = h / (inertia + h * d)  # what a unit of force adds to the velocity in a substep
+            for _ in range(substeps):
+                x = q if n > 1 else v
+                t = step * h
+                error = goal[experiment, step] - q
+                command = goal[experiment, step]
+                if loop:
+                    command = gain[experiment, k] * error - derivative * v
+                for c in range(n_commands):
+                    command = commands[c](command, error, t, h, theta, c_at[c], memory, 0)
+                drive = supply[experiment, k] * on * command
+                other = -stiffness * x if n > 1 else 0.0
+                if weight != 0.0:
+                    other -= weight * math.sin(radian * (x - rest))
+                for j in range(until[FORCE]):
+                    other += terms[j](x, v, t, h, theta, p_at[j], memory, m_at[j])
+                hold = 0.0
+                for j in range(until[FORCE], until[FRICTION]):
+                    if m_at[j] < m_at[j + 1]:
+                        memory[m_at[j]] = abs(drive - back_emf * on * v - other)
+                    hold += terms[j](x, v, t, h, theta, p_at[j], memory, m_at[j])
+                for j in range(until[FRICTION], until[OUTFLOW]):
+                    other -= terms[j](x, 0.0, t, h, theta, p_at[j], memory, m_at[j])
+                new = v + scale * (drive + other - d * v)
+                if hold > 0.0:
+                    new += scale * dry_friction(v, new, scale, hold)
+                if n > 1:
+                    q += 0.5 * h * (v + new)
+                    for j in range(until[RIM], until[STOP]):
+                        end = min(max(q, theta[p_at[j]]), theta[p_at[j] + 1])
+                        if q != end:
+                            new = min(new, 0.0) if q > end else max(new, 0.0)
+                            q = end
+                v = new
+                step += 1
+
+
+run_machine_directly = run_machine.overloads[run_machine.signatures[0]].entry_point

@@ -1,0 +1,243 @@
+"""The table [plant] of a dataset.toml: what is known of the machine, with its units turned into SI."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from reprlib import repr as short
+from typing import Any
+
+import numpy as np
+
+from simgap.known_plant import Known, KnownPlant
+from simgap.records import Channels, Dataset, Experiment, UnusableInput
+
+KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled", "gravity", "hangs_at",
+        "ticks_per_turn", "controller")  # fmt: skip
+CONTROLLER_KEYS = ("goal", "gain", "derivative")
+INTERVAL_KEYS = ("value", "low", "high")
+NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
+STANDARD_GRAVITY = 9.80665
+TURN = 2 * math.pi
+ANGLES = {"rad": 1.0, "deg": TURN / 360, "°": TURN / 360, "turn": TURN, "rev": TURN}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
+TICKS = ("tick", "ticks", "count", "counts")
+# What a unit is worth in SI. A quantity without a unit is in SI already.
+UNITS = {
+    "mass": {"kg": 1.0, "g": 1e-3, "lb": 0.45359237},
+    "arm": LENGTHS,
+    "inertia": {"kgm2": 1.0, "gm2": 1e-3, "kgcm2": 1e-4, "gcm2": 1e-7, "kg": 1.0, "g": 1e-3, "m2": 1.0, "cm2": 1e-4},
+    "damping": {"Nms/rad": 1.0, "Nms": 1.0, "Ns/m": 1.0, "m2/s": 1.0},
+    "supply": {"V": 1.0, "mV": 1e-3, "%": 1e-2, "duty": 1.0},
+    "gain": {},
+    "derivative": {},
+}
+
+
+def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
+    """Read a table of what is known; `where` begins the sentence of an UnusableInput."""
+    where = f"{where}: [plant]"
+    _check_table(table, KEYS, where)
+    inputs, output = [channel.name for channel in channels.inputs], channels.outputs[0]
+    if len(channels.outputs) != 1 or output.kind not in ("position", "velocity", "level"):
+        raise UnusableInput(
+            f"{where} needs a single output whose kind is position, velocity or level; "
+            f"give {short(output.name)} its kind, or leave the table out"
+        )
+    controller = table.get("controller")
+    used: list[str] = []
+
+    def constant(owner: Mapping[str, Any], key: str, quantity: str = "") -> Known | None:
+        return _known(owner[key], quantity or key, key, channels, where, used) if key in owner else None
+
+    if controller is not None:
+        _check_table(controller, CONTROLLER_KEYS, f"{where}: controller", required=("goal",))
+        if output.kind != "position":
+            raise UnusableInput(f"{where}: a controller of a {output.kind} is not known here; leave it out")
+    if "inertia" in table and "area" in table:
+        raise UnusableInput(f"{where}: inertia and area are the same number of two machines; leave one out")
+    known = {key: constant(table, key) for key in ("mass", "arm", "damping", "supply")}
+    inertia = constant(table, "inertia") or constant(table, "area", "inertia")
+    of_controller = {key: constant(controller or {}, key) for key in ("gain", "derivative")}
+    enabled = _column(table["enabled"], "enabled", inputs, where, used) if "enabled" in table else ""
+    for key in ("damping", "derivative"):
+        number = (known | of_controller).get(key)
+        if number is not None and number.column:
+            raise UnusableInput(f"{where}: {key} must be a number or an interval, not a column")
+    if known["arm"] is not None and known["mass"] is None:
+        raise UnusableInput(f"{where}: arm needs the mass that it carries; add mass, or give inertia")
+    drive = _drive(table, inputs, used, where)
+    radian = _scale(output.unit, table.get("ticks_per_turn"), where)
+    gravity = _gravity(table.get("gravity", False), known, output.unit, where)
+    goal_unit = channels.inputs[inputs.index(drive)].unit
+    factor = 1.0
+    if controller is not None and goal_unit != output.unit:
+        if (goal_unit in LENGTHS) != (output.unit in LENGTHS):
+            raise UnusableInput(f"{where}: the goal is in {goal_unit or '1'}, the output in {output.unit or '1'}; "
+                                "give both a unit of the same quantity")  # fmt: skip
+        factor = _scale(goal_unit, table.get("ticks_per_turn"), where) / radian
+    return KnownPlant(
+        input=drive, controlled=controller is not None, **of_controller, enabled=enabled,
+        differentiates=bool(controller) and "derivative" in controller, **known, inertia=inertia, gravity=gravity,
+        hangs_at=_number(table.get("hangs_at", 0.0), "hangs_at", where), radian=radian, goal_factor=factor,
+    )  # fmt: skip
+
+
+def _drive(table: Mapping[str, Any], inputs: Sequence[str], used: list[str], where: str) -> str:
+    """Find the column of the goal or of the drive; every input must then be something."""
+    controller = table.get("controller")
+    drive = controller["goal"] if controller is not None else table.get("input")
+    if controller is not None and "input" in table:
+        raise UnusableInput(f"{where}: the goal of the controller is the input; leave input out")
+    if drive is None:
+        free = [name for name in inputs if name not in used]
+        if len(free) != 1:
+            raise UnusableInput(f"{where}: which input drives it? Write input = one of {', '.join(free or inputs)}")
+        drive = free[0]
+    drive = _column(drive, "goal" if controller is not None else "input", inputs, where, used)
+    unused = [name for name in inputs if name not in used]
+    if unused:
+        raise UnusableInput(
+            f"{where}: it does not say what {short(unused[0])} is; name it there, or take it out of the inputs"
+        )
+    return drive
+
+
+def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels: Channels, where: str) -> None:
+    """Refuse columns that cannot be what the table says they are. Raises UnusableInput."""
+    names = [channel.name for channel in channels.inputs]
+    for key in ("mass", "arm", "inertia"):
+        known = getattr(plant, key)
+        for x in experiments if known is not None and known.column else ():
+            values = x.u[:, names.index(known.column)]
+            if np.ptp(values) > 0 or values[0] <= 0:
+                what = "changes" if np.ptp(values) > 0 else f"is {values[0]:g}"
+                raise UnusableInput(
+                    f"{where}: [plant]: the column {short(known.column)} {what} in {x.name}; "
+                    f"{key} must be one positive number in each experiment"
+                )
+    for x in experiments if plant.enabled else ():
+        if not np.isin(x.u[:, names.index(plant.enabled)], (0.0, 1.0)).all():
+            raise UnusableInput(
+                f"{where}: [plant]: the column {short(plant.enabled)} of {x.name} must hold 0 (off) and 1 (on) only"
+            )
+
+
+def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
+    """Say of a data set what is known of its machine, as a table [plant] would. Raises UnusableInput."""
+    if not table:
+        return dataset
+    channels = replace(dataset.channels, plant=read_plant(table, dataset.channels, dataset.name))
+    training = dataset.training
+    check_records(channels.plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name)
+    return replace(dataset, training=replace(training, channels=channels), channels=channels)
+
+
+def parse_known(options: Sequence[str], where: str = "--known") -> dict[str, Any]:
+    """Turn `mass=0.5kg`, `controller.goal=r` or `arm=0.1..0.12m` into a table. Raises UnusableInput."""
+    table: dict[str, Any] = {}
+    for option in options:
+        key, sign, value = option.partition("=")
+        if not sign or not key.strip() or not value.strip():
+            raise UnusableInput(f"{where}: {short(option)} must be written like mass=0.5kg")
+        *path, name = key.strip().split(".")
+        owner = table
+        for part in path:
+            owner = owner.setdefault(part, {})
+        value = value.strip()
+        low, between, high = value.partition("..")
+        if between:
+            end = NUMBER.fullmatch(high)
+            owner[name] = {"low": low + (end[2] or "" if end else ""), "high": high}
+        elif value in ("true", "false"):
+            owner[name] = value == "true"
+        else:
+            owner[name] = float(value) if (found := NUMBER.fullmatch(value)) and not found[2] else value
+    return table
+
+
+def _known(value: Any, quantity: str, key: str, channels: Channels, where: str, used: list[str]) -> Known:
+    if isinstance(value, Mapping):
+        _check_table(value, INTERVAL_KEYS, f"{where}: {key}", required=("low", "high"))
+        low, high = (_quantity(value[end], quantity, f"{key}.{end}", where) for end in ("low", "high"))
+        middle = _quantity(value["value"], quantity, f"{key}.value", where) if "value" in value else 0.5 * (low + high)
+        if not low < high or not low <= middle <= high:
+            raise UnusableInput(f"{where}: {key} must have low < high, and its value between them")
+        return Known(middle, low, high)
+    names = [channel.name for channel in channels.inputs]
+    if isinstance(value, str) and (value in names or not NUMBER.fullmatch(value)):
+        column = _column(value, key, names, where, used)
+        unit = channels.inputs[names.index(column)].unit
+        return Known(column=column, factor=_factor(unit, quantity, f"{key}, column {short(column)},", where))
+    number = _quantity(value, quantity, key, where)
+    return Known(number, number, number)
+
+
+def _quantity(value: Any, quantity: str, key: str, where: str) -> float:
+    number, unit = value, ""
+    if isinstance(value, str) and (found := NUMBER.fullmatch(value)):
+        number, unit = float(found[1]), found[2] or ""
+    number = _number(number, key, where)
+    if number < 0 or (number == 0 and quantity in ("mass", "arm", "supply", "gain")):
+        raise UnusableInput(f"{where}: {key} is {number:g}; it must be positive")
+    return number * _factor(unit, quantity, key, where)
+
+
+def _factor(unit: str, quantity: str, key: str, where: str) -> float:
+    plain = re.sub(r"[\s^*·]", "", unit).replace("²", "2")
+    if not plain or quantity in ("gain", "derivative"):
+        return 1.0
+    known = UNITS[quantity]
+    if plain not in known:
+        raise UnusableInput(f"{where}: {key} is in {short(unit)}; write it in one of {', '.join(known)}")
+    return known[plain]
+
+
+def _number(value: Any, key: str, where: str) -> float:
+    if type(value) not in (int, float) or not math.isfinite(value):
+        raise UnusableInput(f"{where}: {key} is {short(value)}; give a number, an input column, or low and high")
+    return float(value)
+
+
+def _column(value: Any, key: str, inputs: Sequence[str], where: str, used: list[str]) -> str:
+    if not isinstance(value, str) or value not in inputs:
+        raise UnusableInput(f"{where}: {key} is {short(value)}, which is no input; there are {', '.join(inputs)}")
+    if value in used:
+        raise UnusableInput(f"{where}: the input {short(value)} is named twice; it is one thing only")
+    used.append(value)
+    return value
+
+
+def _scale(unit: str, ticks_per_turn: Any, where: str) -> float:
+    """Return how many rad (or m) a unit of a position is; of what is neither, 1."""
+    if unit in TICKS and ticks_per_turn is None:
+        raise UnusableInput(f"{where}: an angle is in {unit}; add ticks_per_turn")
+    if unit in TICKS:
+        ticks = _number(ticks_per_turn, "ticks_per_turn", where)
+        if ticks <= 0:
+            raise UnusableInput(f"{where}: ticks_per_turn is {ticks:g}; it must be positive")
+        return TURN / ticks
+    return (ANGLES | LENGTHS).get(unit.removesuffix("/s"), 1.0)
+
+
+def _gravity(value: Any, known: Mapping[str, Known | None], unit: str, where: str) -> float:
+    if value is False:
+        return 0.0
+    if known["mass"] is None or known["arm"] is None:
+        raise UnusableInput(f"{where}: gravity needs mass and arm; without them leave it out, and it is looked for")
+    if unit not in ANGLES and unit not in TICKS:
+        raise UnusableInput(f"{where}: gravity acts on an angle; the output is in {unit or '1'}, so write its unit")
+    return STANDARD_GRAVITY if value is True else _number(value, "gravity", where)
+
+
+def _check_table(content: Any, known: Sequence[str], where: str, required: Sequence[str] = ()) -> None:
+    if not isinstance(content, Mapping):
+        raise UnusableInput(f"{where} must be a table")
+    for key in content:
+        if key not in known:
+            raise UnusableInput(f"{where}: unknown key {short(key)}; known are {', '.join(known)}")
+    for key in required:
+        if key not in content:
+            raise UnusableInput(f"{where}: {key} is missing; add it")

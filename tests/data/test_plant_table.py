@@ -1,0 +1,97 @@
+"""The table [plant] of a dataset.toml: what it says, in SI units, and one sentence for each that cannot be used."""
+
+import numpy as np
+import pytest
+
+import simgap
+from simgap.data.formats.plant_table import parse_known, read_plant
+from simgap.records import Channel, Channels, UnusableInput
+
+SERVO = Channels(
+    (Channel("goal", "deg"), Channel("on"), Channel("volts", "mV"), Channel("kp"), Channel("load", "g"),
+     Channel("arm", "cm")),
+    (Channel("q", "rad", "position"),),
+)  # fmt: skip
+TABLE = {
+    "mass": "load", "arm": "arm", "supply": "volts", "enabled": "on", "gravity": True,
+    "controller": {"goal": "goal", "gain": "kp"},
+}  # fmt: skip
+TWO = Channels((Channel("a"), Channel("b")), (Channel("x", "m", "position"),))
+CART = Channels((Channel("force", "N"),), (Channel("x", "m", "position"),))
+
+
+def test_columns_are_turned_into_si_units():
+    plant = read_plant(TABLE, SERVO, "d")
+    assert (plant.input, plant.controlled, plant.enabled) == ("goal", True, "on")
+    assert plant.mass.column == "load" and plant.mass.factor == 1e-3
+    assert plant.arm.factor == 1e-2 and plant.supply.factor == 1e-3
+    assert plant.goal_factor == pytest.approx(np.pi / 180)
+    assert plant.gravity == pytest.approx(9.80665)
+
+
+def test_numbers_come_with_units_and_doubted_ones_with_an_interval():
+    plant = read_plant({"mass": "500 g", "damping": {"low": 0.1, "high": 0.3}}, CART, "d")
+    assert plant.mass.certain and plant.mass.value == 0.5
+    assert not plant.damping.certain and plant.damping.value == pytest.approx(0.2)
+    assert plant.input == "force"
+
+
+@pytest.mark.parametrize(
+    ("channels", "table", "says"),
+    [
+        (CART, {"maas": 1.0}, "unknown key 'maas'"),
+        (CART, {"mass": -1.0}, "mass is -1; it must be positive"),
+        (CART, {"mass": "0.5 V"}, "mass is in 'V'; write it in one of kg, g"),
+        (CART, {"mass": "load"}, "'load', which is no input; there are force"),
+        (CART, {"mass": {"low": 2, "high": 1}}, "low < high"),
+        (CART, {"mass": [1]}, "give a number"),
+        (CART, {"arm": 0.1}, "arm needs the mass"),
+        (CART, {"gravity": True}, "gravity needs mass and arm"),
+        (CART, {"mass": 1.0, "arm": 1.0, "gravity": True}, "gravity acts on an angle"),
+        (CART, {"controller": {"gain": 1.0}}, "goal is missing"),
+        (CART, {"controller": 3}, "controller must be a table"),
+        (TWO, {}, "which input drives it? Write input = one of a, b"),
+        (SERVO, {**TABLE, "supply": 12.0}, "does not say what 'volts' is"),
+        (SERVO, {**TABLE, "supply": "load"}, "named twice"),
+        (Channels((Channel("u"),), (Channel("y"),)), {}, "whose kind is position, velocity or level"),
+        (Channels((Channel("u", "ticks"),), (Channel("y", "ticks", "position"),)), {}, "add ticks_per_turn"),
+    ],
+)
+def test_a_bad_table_gets_one_sentence(channels, table, says):
+    with pytest.raises(UnusableInput, match=r"^d: \[plant\]") as raised:
+        read_plant(table, channels, "d")
+    assert says in str(raised.value)
+
+
+def test_options_are_written_like_mass_0_5_kg():
+    assert parse_known(["mass=0.5kg", "arm=10..12cm", "gravity=true", "controller.goal=r"]) == {
+        "mass": "0.5kg", "arm": {"low": "10cm", "high": "12cm"}, "gravity": True, "controller": {"goal": "r"},
+    }  # fmt: skip
+    with pytest.raises(UnusableInput, match=r"must be written like mass=0\.5kg"):
+        parse_known(["mass"])
+
+
+def write(folder, masses):
+    for split in ("train", "test"):
+        (folder / split).mkdir()
+        for i, mass in enumerate(masses):
+            rows = "\n".join(f"{np.sin(0.3 * k)},{mass(k)},{np.sin(0.3 * k - 1)}" for k in range(80))
+            (folder / split / f"{i}.csv").write_text("force,m,x\n" + rows)
+    (folder / "dataset.toml").write_text(
+        'name = "cart"\nsampling_time = 0.1\n[[inputs]]\nname = "force"\n[[inputs]]\nname = "m"\nunit = "kg"\n'
+        '[[outputs]]\nname = "x"\nunit = "m"\nkind = "position"\n'
+        '[splits]\ntrain = "train/*.csv"\ntest = "test/*.csv"\n[plant]\nmass = "m"\n'
+    )
+
+
+def test_a_folder_hands_its_table_on(tmp_path):
+    write(tmp_path, [lambda k: 1.0, lambda k: 2.0])
+    data = simgap.load(str(tmp_path))
+    assert data.channels.plant.mass.column == "m"
+    assert data.training.channels.plant is data.channels.plant
+
+
+def test_a_mass_that_changes_within_an_experiment_is_refused(tmp_path):
+    write(tmp_path, [lambda k: 1.0 + (k > 40)])
+    with pytest.raises(UnusableInput, match=r"the column 'm' changes in .*; mass must be one positive number"):
+        simgap.load(str(tmp_path))
