@@ -41,6 +41,11 @@ class PlantWriter:
         self.theta = fitted.estimate.theta
         self.of_theta, self.sub = f"P{number}", self.plant.substeps
         self.h = self.plant.dt / self.sub
+        if self.plant.machine is not None:
+            raise UnusableInput(
+                "a machine with a table [plant] cannot be exported yet: its controller acts within a step; "
+                "`simgap simulate` runs it"
+            )
         if self.plant.imposed and self.plant.zeros:
             raise UnusableInput(
                 "the model reads the rate of the imposed motion from the sample after the present one; a step knows no "
