@@ -117,7 +117,8 @@ class Simulator:
             goal = goal * known.goal_factor
         inertias, weights = machine.moments(self._u_first, theta)
         of_command = plant.on("input", plant.nu)
-        commands = tuple(compiled(term.effect.command) for term in of_command)
+        limited: list[Any] = [term.effect for term in of_command]
+        commands = tuple(compiled(effect.command) for effect in limited)
         c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * (SLOTS - len(of_command)))
         numbers = np.array([*theta[[DAMPING, BACK_EMF, DERIVATIVE, STIFFNESS]], known.radian, known.hangs_at])
         run_machine_directly(

@@ -109,13 +109,14 @@ def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels
     """Refuse columns that cannot be what the table says they are. Raises UnusableInput."""
     names = [channel.name for channel in channels.inputs]
     for key in ("mass", "arm", "inertia"):
-        known = getattr(plant, key)
-        for x in experiments if known is not None and known.column else ():
-            values = x.u[:, names.index(known.column)]
+        known: Known | None = getattr(plant, key)
+        column = known.column if known is not None else ""
+        for x in experiments if column else ():
+            values = x.u[:, names.index(column)]
             if np.ptp(values) > 0 or values[0] <= 0:
                 what = "changes" if np.ptp(values) > 0 else f"is {values[0]:g}"
                 raise UnusableInput(
-                    f"{where}: [plant]: the column {short(known.column)} {what} in {x.name}; "
+                    f"{where}: [plant]: the column {short(column)} {what} in {x.name}; "
                     f"{key} must be one positive number in each experiment"
                 )
     for x in experiments if plant.enabled else ():
@@ -129,9 +130,10 @@ def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
     """Say of a data set what is known of its machine, as a table [plant] would. Raises UnusableInput."""
     if not table:
         return dataset
-    channels = replace(dataset.channels, plant=read_plant(table, dataset.channels, dataset.name))
+    plant = read_plant(table, dataset.channels, dataset.name)
+    channels = replace(dataset.channels, plant=plant)
     training = dataset.training
-    check_records(channels.plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name)
+    check_records(plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name)
     return replace(dataset, training=replace(training, channels=channels), channels=channels)
 
 

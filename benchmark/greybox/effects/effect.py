@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -175,7 +175,7 @@ class InputEffect(Effect):
 
     port: ClassVar[Port] = "input"
     # What is left of the command c of a controller inside a machine, compiled: command(c, error, t, h, p, i, m, j).
-    command: ClassVar[Callable[..., float] | None] = None
+    command: ClassVar[Any] = None
     # Where in such a machine it may act: on the goal.
     on_goal: ClassVar[bool] = False
 
