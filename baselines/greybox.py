@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import Term, plants_of
+from simgap.greybox.position_and_velocity import plants_of
 from simgap.greybox.score_test import add, from_other_poles
+from simgap.greybox.terms import Term
 from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS
 

@@ -2,7 +2,7 @@
 
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import plants_of
+from simgap.greybox.position_and_velocity import plants_of
 from simgap.records import TrainingSet
 
 

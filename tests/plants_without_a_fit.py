@@ -5,7 +5,8 @@ from parameters_of_effects import scales, signal
 
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.noise import white
-from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.plant import Plant
+from simgap.greybox.terms import PlantScales, Term
 
 DT = 0.1
 # kind, order, other fields of Plant, theta of the linear plant

@@ -11,7 +11,8 @@ from simgap.diagnosis import gains, unsaid_kinds
 from simgap.findings import Cause, Gain
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import MAX_TERMS, Term
+from simgap.greybox.plant import MAX_TERMS
+from simgap.greybox.terms import Term
 from simgap.records import Dataset
 
 # Of what a search that did not end by itself takes of the error: the least that the effects it rests on must take.

@@ -13,8 +13,9 @@ from simgap.exports import bodies
 from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.kernels import transition
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import Plant, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator
+from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
 from simgap.step_form import StepForm, source_of

@@ -12,9 +12,10 @@ from jaxtyping import Float
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
-from simgap.greybox.plant import Plant, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
+from simgap.greybox.terms import Term
 
 MAX_STEPS = 40
 # Of the variance of the errors: what a fit of the search may leave to gain. It moves no comparison of two models.

@@ -16,9 +16,9 @@ from simgap.greybox.fitting import descend
 from simgap.greybox.identification import Identified
 from simgap.greybox.intervals import intervals
 from simgap.greybox.outliers import Outliers
-from simgap.greybox.plant import Term
 from simgap.greybox.problem import Problem
 from simgap.greybox.selection import Selection
+from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, significant
 from simgap.records import Channels, Kind
 

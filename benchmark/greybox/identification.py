@@ -15,8 +15,7 @@ from simgap.greybox.linear_rival import linear_rival
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
-from simgap.greybox.plant import plants_of
-from simgap.greybox.position_and_velocity import with_kind, with_velocity
+from simgap.greybox.position_and_velocity import plants_of, with_kind, with_velocity
 from simgap.greybox.problem import Problem
 from simgap.greybox.rivals import of_better_joint, of_better_order
 from simgap.greybox.samples import Records, excerpts

@@ -13,10 +13,11 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors
 from simgap.greybox.linear import WORTH_AN_ORDER, scaled
-from simgap.greybox.plant import Plant, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
 from simgap.greybox.selection import Selection
+from simgap.greybox.terms import Term
 from simgap.records import Channels
 from simgap.registry import EFFECTS
 

@@ -13,10 +13,10 @@ from simgap.greybox.effects.effect import Effect
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.noise import schwarz_order
-from simgap.greybox.plant import Term
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.score_test import candidates, extend
 from simgap.greybox.selection import Compared, compare
+from simgap.greybox.terms import Term
 from simgap.greybox.trial import MATTERS, Trial, assess, holds_out, ranked, significant
 from simgap.records import Channels, Kind, TrainingSet
 

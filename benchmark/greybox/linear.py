@@ -14,12 +14,13 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors, errors_on, in_most
 from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
-from simgap.greybox.plant import Plant, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.score_test import add, candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.terms import Term
 from simgap.greybox.trial import score_gain
 from simgap.records import Channels, Experiment, Kind
 

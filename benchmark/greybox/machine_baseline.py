@@ -15,10 +15,11 @@ from simgap.greybox.held_out import errors_on
 from simgap.greybox.machine import DAMPING, INERTIA, NAMES, STIFFNESS, Machine, machine_of
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.outliers import find_glitches, without_outliers
-from simgap.greybox.plant import Plant, PlantScales
+from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.terms import PlantScales
 from simgap.records import Channels, Experiment
 
 # A machine has records of many conditions, and a search sees whole ones, so that each begins at rest.

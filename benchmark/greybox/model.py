@@ -16,10 +16,11 @@ from simgap.greybox.initial_states import UsualStart, initial_states, usual_star
 from simgap.greybox.machine import Machine
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
-from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
+from simgap.greybox.terms import PlantScales, Term
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 

@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float
 
 from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
-from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
-from simgap.greybox.samples import OFFSET
-from simgap.records import Channels, Kind
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, Start
+from simgap.greybox.terms import PlantScales, Term
+from simgap.records import Kind
 
 # Of poles, per sample.
 FASTEST_TANK = 5.0
@@ -23,52 +23,6 @@ FASTEST = 1e6
 SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
 MAX_TERMS = 5  # that a search may find
 MOST_OF_A_MACHINE = 8
-
-
-def plants_of(channels: Channels) -> list[tuple[int, ...]]:
-    """List the outputs of each plant: a position with its velocity, where there is one of each; else each alone."""
-    kinds = [channel.kind for channel in channels.outputs]
-    if kinds.count("position") == 1 and kinds.count("velocity") == 1:
-        pair = (kinds.index("position"), kinds.index("velocity"))
-        return [pair] + [(i,) for i in range(len(kinds)) if i not in pair]
-    return [(i,) for i in range(len(kinds))]
-
-
-@dataclass(frozen=True, eq=False)
-class PlantScales:
-    """Signal scales at each input and at each output; forces see those of the first of both."""
-
-    inputs: tuple[SignalScales, ...]
-    outputs: tuple[SignalScales, ...]
-    fastest: float = math.inf  # 1/s, of the poles of the plain model
-
-    @property
-    def output_sizes(self) -> Float[np.ndarray, " ny"]:
-        """Sizes of the outputs, as `Records.sizes` of the readings that the scales were measured on."""
-        sizes = [max(s.y_rms, OFFSET * max(abs(s.y_low), abs(s.y_high))) or 1.0 for s in self.outputs]
-        return np.array(sizes)
-
-    def of(self, term: Term) -> SignalScales:
-        """Return the scales where a term acts."""
-        port = term.effect.port
-        return self.inputs[term.channel] if port == "input" else self.outputs[term.channel if port == "output" else 0]
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect where it acts: on which input, or on which output."""
-
-    effect: Effect
-    channel: int = 0
-
-    @property
-    def key(self) -> tuple[str, int]:
-        """Name and channel; a model has each term once."""
-        return self.effect.name, self.channel
-
-    def replaces(self, other: Term) -> bool:
-        """Tell whether this effect contains the other one as a special case."""
-        return other.effect.name in self.effect.contains
 
 
 @dataclass(frozen=True)

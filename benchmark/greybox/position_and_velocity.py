@@ -79,3 +79,12 @@ def _regress(
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " m"]]:
     gains = np.linalg.lstsq(features, y, rcond=None)[0]
     return y - features @ gains, gains
+
+
+def plants_of(channels: Channels) -> list[tuple[int, ...]]:
+    """List the outputs of each plant: a position with its velocity, where there is one of each; else each alone."""
+    kinds = [channel.kind for channel in channels.outputs]
+    if kinds.count("position") == 1 and kinds.count("velocity") == 1:
+        pair = (kinds.index("position"), kinds.index("velocity"))
+        return [pair] + [(i,) for i in range(len(kinds)) if i not in pair]
+    return [(i,) for i in range(len(kinds))]

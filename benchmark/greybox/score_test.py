@@ -11,8 +11,9 @@ from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.machine import DAMPING
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
-from simgap.greybox.plant import Plant, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
+from simgap.greybox.terms import Term
 from simgap.registry import EFFECTS
 
 # Score tests below this log-likelihood ratio are not worth a refit.

@@ -13,8 +13,8 @@ import numba
 from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
-from simgap.greybox.plant import Term
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of, promising
+from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
 
 T = TypeVar("T")

@@ -9,9 +9,9 @@ from jaxtyping import Float
 
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.plant import PlantScales
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
+from simgap.greybox.terms import PlantScales
 from simgap.records import Channels
 
 MAX_LINES = 3

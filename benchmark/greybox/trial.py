@@ -13,9 +13,9 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import BLOCKS, in_most
 from simgap.greybox.noise import log_likelihood, schwarz_order
-from simgap.greybox.plant import Term
 from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, candidates
+from simgap.greybox.terms import Term
 
 # The chance, over the whole catalogue, that noise alone passes for an effect.
 FALSE_NAMES = 1e-3

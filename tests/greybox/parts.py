@@ -9,9 +9,10 @@ from simgap.greybox import noise, outliers, signal_scales
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
-from simgap.greybox.plant import Plant, PlantScales, Term
+from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
+from simgap.greybox.terms import PlantScales, Term
 from simgap.records import Channel, Channels, Experiment
 from simgap.registry import EFFECTS
 

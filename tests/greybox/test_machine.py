@@ -8,8 +8,8 @@ import pytest
 from simgap.data.formats.plant_table import read_plant
 from simgap.greybox.machine import INERTIA, NAMES
 from simgap.greybox.machine_baseline import find_machine_baseline
-from simgap.greybox.plant import Term
 from simgap.greybox.score_test import extend
+from simgap.greybox.terms import Term
 from simgap.records import Channel, Channels, Experiment
 from simgap.registry import EFFECTS
 

@@ -1,0 +1,49 @@
+"""An effect where it acts, and the sizes of the signals there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.greybox.effects.effect import Effect, SignalScales
+from simgap.greybox.samples import OFFSET
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect where it acts: on which input, or on which output."""
+
+    effect: Effect
+    channel: int = 0
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Name and channel; a model has each term once."""
+        return self.effect.name, self.channel
+
+    def replaces(self, other: Term) -> bool:
+        """Tell whether this effect contains the other one as a special case."""
+        return other.effect.name in self.effect.contains
+
+
+@dataclass(frozen=True, eq=False)
+class PlantScales:
+    """Signal scales at each input and at each output; forces see those of the first of both."""
+
+    inputs: tuple[SignalScales, ...]
+    outputs: tuple[SignalScales, ...]
+    fastest: float = math.inf  # 1/s, of the poles of the plain model
+
+    @property
+    def output_sizes(self) -> Float[np.ndarray, " ny"]:
+        """Sizes of the outputs, as `Records.sizes` of the readings that the scales were measured on."""
+        sizes = [max(s.y_rms, OFFSET * max(abs(s.y_low), abs(s.y_high))) or 1.0 for s in self.outputs]
+        return np.array(sizes)
+
+    def of(self, term: Term) -> SignalScales:
+        """Return the scales where a term acts."""
+        port = term.effect.port
+        return self.inputs[term.channel] if port == "input" else self.outputs[term.channel if port == "output" else 0]
