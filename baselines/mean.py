@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.estimation.stepping import constant
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
-from simgap.step_form import StepForm
+from simgap.step_form import StepForm, constant
 
 
 @MODELS.register("mean")

@@ -71,3 +71,16 @@ def source_of(function: Any, name: str = "") -> str:
     text = text[re.search(r"^def ", text, re.MULTILINE).start() :]  # type: ignore[union-attr]
     text = re.sub(r"  # noqa.*", "", text)
     return re.sub(r"^def \w+", f"def {name}", text) if name else text
+
+
+HOLD = '''\
+def step(s: list, u: list, y: list):
+    """Give the same outputs at every sample."""
+    for i in range({ny}):
+        y[i] = s[i]
+'''
+
+
+def constant(level: Float[np.ndarray, " ny"], nu: int) -> StepForm:
+    """Write a model whose outputs never change as a step; they are its state."""
+    return StepForm(HOLD.format(ny=len(level)), {}, level, nu, len(level), False)

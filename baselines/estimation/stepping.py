@@ -58,16 +58,3 @@ def start(
     """Return the state that the first n samples show."""
     state = model.state_after((u - model.u_mean)[None, : len(y_init)], (y_init - model.y_mean)[None])
     return np.append(state.ravel(), np.zeros(model.order * (y_init.shape[1] + u.shape[1])))
-
-
-HOLD = '''\
-def step(s: list, u: list, y: list):
-    """Give the same outputs at every sample."""
-    for i in range({ny}):
-        y[i] = s[i]
-'''
-
-
-def constant(level: Float[np.ndarray, " ny"], nu: int) -> StepForm:
-    """Write a model whose outputs never change as a step; they are its state."""
-    return StepForm(HOLD.format(ny=len(level)), {}, level, nu, len(level), False)

@@ -40,20 +40,22 @@ def diagnose(
     profiles: bool = False,
     views_too: bool = True,
     kind: str | Mapping[str, str] | None = None,
+    known: Mapping[str, Any] | None = None,
 ) -> Diagnosis:
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
     `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the views and the
     features of the learnable rest. With `profiles` the likelihood profile of every parameter is computed too, as the
     page shows it; without `views_too` the views of the error and its budget are left out. `kind` says what the outputs
-    are, as in `simgap.load`. Raises UnusableInput.
+    are, and `known` what a table [plant] would say, as in `simgap.load`. Raises UnusableInput.
     """
     from simgap.data import load
+    from simgap.data.formats.plant_table import with_known
     from simgap.data.kinds import with_kinds
 
     begin = time.perf_counter()
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
-    dataset = with_kinds(dataset, kind)
+    dataset = with_known(with_kinds(dataset, kind), known)
     check_numbers(dataset.test, dataset.channels)
     identified = identify(dataset.training)
     dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, dataset.training))

@@ -36,5 +36,7 @@ def in_most(gain: np.ndarray) -> bool:
 
     A valve that slips once too often is far off until it moves again, in one block, and the mean alone goes by that.
     """
+    if not gain.mean() > 0:  # nor is it a number
+        return False
     _, by_chance = wilcoxon(gain, alternative="greater")
-    return bool(gain.mean() > 0 and by_chance < BY_CHANCE)
+    return bool(by_chance < BY_CHANCE)

@@ -16,7 +16,7 @@ from simgap.registry import EFFECTS, MODELS
 
 # What models rely on without being digested; a change there that alters what models compute counts this up.
 CONTRACT = 1
-CONTRACT_MODULES = ("simgap", "simgap.records", "simgap.protocol", "simgap.registry")
+CONTRACT_MODULES = ("simgap", "simgap.records", "simgap.protocol", "simgap.registry", "simgap.step_form")
 
 _IMPORT = re.compile(r"(?:^|[:;])[ \t]*((?:from|import)[ \t][^(\n]*(?:\([^)]*\))?)", re.MULTILINE)
 _FOR_READERS = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)

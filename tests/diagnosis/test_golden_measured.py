@@ -9,7 +9,15 @@ import pytest
 GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
 
 
-SLOW = ("arm_pendulum", "damper_36lb", "dart_car", "servo_xl330")  # more than ten seconds each
+SLOW = (
+    "arm_pendulum",
+    "damper_36lb",
+    "dart_car",
+    "loop_FIC20102",
+    "loop_FIC40102C",
+    "loop_LIC30501",
+    "servo_xl330",
+)  # more than ten seconds each
 
 
 @pytest.mark.parametrize(

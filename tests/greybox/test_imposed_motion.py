@@ -65,6 +65,7 @@ def test_a_spring_that_slips_is_hysteresis_with_the_gap_that_it_crosses(gap):
     assert values["force"] == pytest.approx(5.0, rel=0.2) and values["gap"] == pytest.approx(gap, abs=0.8)
 
 
+@pytest.mark.slow
 def test_a_valve_with_play_is_backlash_wherever_in_its_gap_a_record_begins():
     answer = diagnose(dataset(lambda x, begin: 3.0 * play(x, 4.0, begin), seed=2), views_too=False)
     assert first_name(answer) == ("named", "backlash")
