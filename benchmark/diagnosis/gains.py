@@ -44,9 +44,10 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     squares = [_bounded((y - np.concatenate(y_hat)) / spread) ** 2 for y_hat in (before, after)]
     rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of the spread
     rmse = [np.where(error < GROWN, error * spread, np.inf) for error in rmse]
-    losses = [np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares]
+    loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
     experiment = np.repeat(np.arange(len(dataset.test)), [len(x.y[n:]) for x in dataset.test])
-    share, low, high = (value if value > -GROWN else -np.inf for value in share_with_interval(*losses, experiment))
+    shares = share_with_interval(loss_before, loss_after, experiment)
+    share, low, high = (value if value > -GROWN else -np.inf for value in shares)
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
     return Gain(rmse_before, rmse_after, share, low, high)

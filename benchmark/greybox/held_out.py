@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.stats import wilcoxon
 
@@ -38,5 +40,5 @@ def in_most(gain: np.ndarray) -> bool:
     """
     if not gain.mean() > 0:  # nor is it a number
         return False
-    _, by_chance = wilcoxon(gain, alternative="greater")
+    by_chance: Any = wilcoxon(gain, alternative="greater")[1]
     return bool(by_chance < BY_CHANCE)

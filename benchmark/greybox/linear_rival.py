@@ -25,9 +25,10 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     cannot be forecast.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
-    if plain.plant.kind == "other" or len(plain.outputs) > 1 or chosen.plant.per_experiment:
+    output, *others = plain.outputs
+    if plain.plant.kind == "other" or others or chosen.plant.per_experiment:
         return None
-    whole = data.train, data.valid, with_kind(channels, plain.outputs[0], "other"), list(plain.outputs), data.n_init
+    whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     with_effects, without, of_linear = (
         block_errors(fit, plain.valid, data.n_init) for fit in (chosen, plain.estimate, linear.estimate)

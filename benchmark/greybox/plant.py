@@ -90,7 +90,7 @@ class Plant:
         if not isinstance(effect, InputEffect) or not self.machine.controlled:
             known = bool(self.machine.known.gravity) and effect.replaces_spring
             return not known and effect.time_power is None
-        return effect.command is not None if channel == self.nu else effect.on_goal
+        return effect.on_command if channel == self.nu else effect.on_goal
 
     @property
     def most_terms(self) -> int:

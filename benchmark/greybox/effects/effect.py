@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -174,8 +174,9 @@ class InputEffect(Effect):
     """An effect between the commanded input and the input that acts on the plant."""
 
     port: ClassVar[Port] = "input"
-    # What is left of the command c of a controller inside a machine, compiled: command(c, error, t, h, p, i, m, j).
-    command: ClassVar[Any] = None
+    # Acts on the command c of a controller inside a machine too, compiled: command(c, error, t, h, p, i, m, j).
+    on_command: ClassVar[bool] = False
+    command: ClassVar[Callable[..., float]]
     # Where in such a machine it may act: on the goal.
     on_goal: ClassVar[bool] = False
 

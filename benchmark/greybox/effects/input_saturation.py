@@ -22,6 +22,7 @@ class InputSaturation(InputEffect):
         "Beyond a limit more input has no effect: the supply voltage, a current limit, the end of a valve's travel."
     )
     reference: ClassVar[str] = "Hippe, Windup in Control, 2006, ch. 1"
+    on_command: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 50
     shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
