@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -73,25 +73,13 @@ def export(
             )
         known = _known(plant or ())
         exports.check_target(to, out, into)  # first, because a fit takes its time
-        if exports.is_saved(model):
-            done = exports.export(
-                model, data, to, out, experiment=experiment, dt=dt, plant=known, into=into, joint=joint
-            )
-        else:
+        params: dict[str, Any] = {}
+        records: Any = data
+        if not exports.is_saved(model):
             exports.check_model(model, to)
-            dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
-            done = exports.export(
-                model,
-                dataset,
-                to,
-                out,
-                parse_params(param or ()),
-                seed,
-                experiment,
-                plant=known,
-                into=into,
-                joint=joint,
-            )
+            records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
+            params = parse_params(param or ())
+        done = exports.export(model, records, to, out, params, seed, experiment, dt, known, into, joint)
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

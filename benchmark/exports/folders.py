@@ -68,11 +68,16 @@ def read_folder(folder: Path) -> About:
         raise UnusableInput(f"{folder / ABOUT} cannot be read: {' '.join(str(error).split())}") from error
 
 
-def _read_record(folder: Path, text: dict[str, Any], nu: int, ny: int) -> CheckRecord:
-    name, n = Path(str(text["file"])).name, int(text["simulated_from_row"])
+def file_in(folder: Path, name: str) -> Path:
+    """Return a file of an export. Raises UnusableInput where it is missing."""
     if not (folder / name).is_file():
         raise UnusableInput(f"{folder / name} is missing; export once more")
-    with (folder / name).open(encoding="utf-8", newline="") as stream:
+    return folder / name
+
+
+def _read_record(folder: Path, text: dict[str, Any], nu: int, ny: int) -> CheckRecord:
+    name, n = Path(str(text["file"])).name, int(text["simulated_from_row"])
+    with file_in(folder, name).open(encoding="utf-8", newline="") as stream:
         _, *rows = csv.reader(stream)  # a name may hold commas and line ends
     values = np.array(rows, dtype=np.float64)
     if values.shape != (len(rows), nu + ny) or not 0 <= n < len(rows):

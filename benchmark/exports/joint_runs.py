@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -40,8 +41,10 @@ def timestep(subject: Subject, joint: Joint) -> float:
     return subject.fitted_on.dt / SUBSTEPS[joint.rough]
 
 
-def write_joint(subject: Subject, joint: Joint, folder: Path) -> None:
-    """Write joint.json: units, gains, which output is which, and where each record starts."""
+def write(root: ET.Element, file: Path, subject: Subject, joint: Joint) -> None:
+    """Write the simulator's file, and joint.json: units, gains, which output is which, where each record starts."""
+    ET.indent(root)
+    file.write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     fitted = subject.model.plants[0]
     plant, theta = fitted.forecasting, fitted.estimate.theta
     about: dict[str, Any] = {
@@ -51,7 +54,7 @@ def write_joint(subject: Subject, joint: Joint, folder: Path) -> None:
         "velocity_gain": float(theta[plant.layout.velocity][0]) if plant.two_outputs else 1.0,
         "starts": {record.name: asdict(start_of(subject, joint, record)) for record in subject.records},
     }  # fmt: skip
-    (folder / FILE).write_text(json.dumps(about, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    (file.parent / FILE).write_text(json.dumps(about, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def read_joint(folder: Path) -> dict[str, Any]:
@@ -70,11 +73,11 @@ def engine() -> Any:
     return mujoco
 
 
-def load(text: str) -> Any:
+def load(file: Path) -> Any:
     """Have MuJoCo read a model. Raises UnusableInput with what it says."""
     mujoco = engine()
     try:
-        return mujoco.MjModel.from_xml_string(text)
+        return mujoco.MjModel.from_xml_string(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise UnusableInput(f"MuJoCo cannot read the model: {' '.join(str(error).split())}") from error
 

@@ -13,13 +13,12 @@ from jaxtyping import Float
 from simgap.exports.grey_boxes import GreyBoxStep
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.greybox.model import FittedPlant, GreyBoxModel
+from simgap.known_plant import ANGLES
 from simgap.records import UnusableInput
 from simgap.registry import EFFECTS
 
 STANDARD_GRAVITY = 9.81  # m/s^2
-# Of the unit of a position, in rad or m; a velocity's is that per second.
-ANGLES = {"rad": 1.0, "deg": pi / 180, "°": pi / 180, "rev": 2 * pi, "turn": 2 * pi}
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}  # in m, as ANGLES in rad; a velocity's is that per second
 CANNOT = "this simulator cannot"
 NO_INERTIA = (
     "forces need the inertia of the joint, in kg m^2 or kg, or the torque constant, in N m or N per unit of the first "

@@ -39,5 +39,5 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
-    higher = score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    return None if higher and not in_most(gain) else linear
+    beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
+    return None if beaten else linear

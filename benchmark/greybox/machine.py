@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.effects.effect import Parameter
-from simgap.known_plant import Known, KnownPlant
+from simgap.known_plant import ANGLES, Known, KnownPlant
 from simgap.records import Channels
 
 # The numbers of a machine in theta, in this order; the gain of the drive follows them.
@@ -160,4 +160,4 @@ def machine_of(channels: Channels, u: Float[np.ndarray, "E T nu"]) -> Machine:
 
 
 def _is_angle(channels: Channels) -> bool:
-    return channels.outputs[0].unit.removesuffix("/s") in ("rad", "deg", "°", "turn", "rev", "tick", "ticks")
+    return channels.outputs[0].unit.removesuffix("/s") in (*ANGLES, "tick", "ticks")

@@ -52,6 +52,11 @@ class Simulator:
         self._u = np.ascontiguousarray(arriving)
         self._u_first = u[:, :1]
         self._constants = self._of_machine(u) if plant.machine else None
+        of_command = plant.on("input", plant.nu) if plant.machine else []
+        limited: list[Any] = [term.effect for term in of_command]
+        self._n_commands, free = len(of_command), SLOTS - len(of_command)
+        self._commands = tuple(compiled(effect.command) for effect in limited) + (compiled(nothing),) * free
+        self._c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * free)
         self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
         forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
@@ -116,16 +121,12 @@ class Simulator:
         if machine.controlled and known.goal_factor != 1.0:
             goal = goal * known.goal_factor
         inertias, weights = machine.moments(self._u_first, theta)
-        of_command = plant.on("input", plant.nu)
-        limited: list[Any] = [term.effect for term in of_command]
-        commands = tuple(compiled(effect.command) for effect in limited)
-        c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * (SLOTS - len(of_command)))
         numbers = np.array([*theta[[DAMPING, BACK_EMF, DERIVATIVE, STIFFNESS]], known.radian, known.hangs_at])
         run_machine_directly(
             machine.controlled, np.ascontiguousarray(goal), gain, supply * theta[plant.layout.gains.start], on,
             inertias, weights, numbers, np.ascontiguousarray(start[:, : plant.order]), self.substeps, self.h,
             self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, self._memory,
-            commands + (compiled(nothing),) * (SLOTS - len(commands)), c_at, len(commands), states,
+            self._commands, self._c_at, self._n_commands, states,
         )  # fmt: skip
         return states
 

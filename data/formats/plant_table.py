@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from simgap.known_plant import Known, KnownPlant
+from simgap.known_plant import ANGLES, Known, KnownPlant
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 
 KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled", "gravity", "hangs_at",
@@ -21,7 +21,6 @@ INTERVAL_KEYS = ("value", "low", "high")
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
 STANDARD_GRAVITY = 9.80665
 TURN = 2 * math.pi
-ANGLES = {"rad": 1.0, "deg": TURN / 360, "°": TURN / 360, "turn": TURN, "rev": TURN}
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 TICKS = ("tick", "ticks", "count", "counts")
 # What a unit is worth in SI. A quantity without a unit is in SI already.

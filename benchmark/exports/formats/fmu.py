@@ -13,11 +13,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports.folders import About
+from simgap.exports.folders import About, file_in
 from simgap.exports.formats import c
 from simgap.exports.subjects import CheckRecord, Subject, refusal_of_step
 from simgap.exports.texts import heading, variable_names
-from simgap.records import UnusableInput
 
 FILE = "model.fmu"
 DESCRIPTION = """\
@@ -97,13 +96,12 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
     import fmpy
     from fmpy.fmi2 import FMU2Slave
 
-    if not (folder / FILE).is_file():
-        raise UnusableInput(f"{folder / FILE} is missing; export once more")
+    file = file_in(folder, FILE)
     nu, ny = record.u.shape[1], record.y_hat.shape[1]
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
-        described: Any = fmpy.read_model_description(folder / FILE, validate=True)
-        fmpy.extract(folder / FILE, unzipdir=scratch)
+        described: Any = fmpy.read_model_description(file, validate=True)
+        fmpy.extract(file, unzipdir=scratch)
         identifier = described.coSimulation.modelIdentifier
         slave = FMU2Slave(
             guid=described.guid, unzipDirectory=scratch, modelIdentifier=identifier, instanceName=identifier

@@ -10,13 +10,12 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports import joint_runs, joints
-from simgap.exports.folders import About
+from simgap.exports.folders import About, file_in
 from simgap.exports.joint_runs import STIFF
 from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, body, joint_of
 from simgap.exports.patching import Robot, patched
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
-from simgap.records import UnusableInput
 
 FILE = "model.xml"
 refusal, missing = joints.refusal, joint_runs.missing
@@ -91,16 +90,12 @@ def write(subject: Subject, folder: Path) -> None:
     section = ET.SubElement(root, "actuator")
     for actuator in actuators(joint, "joint", step):
         ET.SubElement(section, "general", actuator)
-    ET.indent(root)
-    (folder / FILE).write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
-    joint_runs.write_joint(subject, joint, folder)
+    joint_runs.write(root, folder / FILE, subject, joint)
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:
     """Step MuJoCo through the record."""
-    if not (folder / FILE).is_file():
-        raise UnusableInput(f"{folder / FILE} is missing; export once more")
-    model = joint_runs.load((folder / FILE).read_text(encoding="utf-8"))
+    model = joint_runs.load(file_in(folder, FILE))
     return joint_runs.run(model, joint_runs.read_joint(folder), about, record, effort=False)
 
 

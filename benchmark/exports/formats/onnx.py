@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports.folders import About
+from simgap.exports.folders import About, file_in
 from simgap.exports.subjects import CheckRecord, Subject
-from simgap.records import UnusableInput
 
 FILE = "model.onnx"
 
@@ -37,10 +36,9 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
     """Run it by onnxruntime."""
     import onnxruntime
 
-    if not (folder / FILE).is_file():
-        raise UnusableInput(f"{folder / FILE} is missing; export once more")
+    file = file_in(folder, FILE)
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(folder / FILE, options, providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(file, options, providers=["CPUExecutionProvider"])
     (y_hat,) = session.run(["y_hat"], {"u": record.u[None], "y_init": record.y_init[None]})
     return np.asarray(y_hat)[0]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports import joint_runs, joints
-from simgap.exports.folders import About
+from simgap.exports.folders import About, file_in
 from simgap.exports.joint_runs import engine
 from simgap.exports.joints import CANNOT, URDF, Joint, body, joint_of
 from simgap.exports.subjects import CheckRecord, Subject
@@ -56,16 +56,12 @@ def write(subject: Subject, folder: Path) -> None:
     clips = [abs(gain) * one["clip"][1] for gain, one in zip(joint.gains, joint.inputs, strict=True) if "clip" in one]
     effort = sum(clips) if len(clips) == len(joint.gains) else FAR
     ET.SubElement(made, "limit", lower=repr(low), upper=repr(high), effort=repr(effort), velocity=repr(FAR))
-    ET.indent(root)
-    (folder / FILE).write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
-    joint_runs.write_joint(subject, joint, folder)
+    joint_runs.write(root, folder / FILE, subject, joint)
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:
     """Step MuJoCo, which reads URDF, through the record; the friction hardly gives way, and the step is ours."""
-    if not (folder / FILE).is_file():
-        raise UnusableInput(f"{folder / FILE} is missing; export once more")
-    model, joint = joint_runs.load((folder / FILE).read_text(encoding="utf-8")), joint_runs.read_joint(folder)
+    model, joint = joint_runs.load(file_in(folder, FILE)), joint_runs.read_joint(folder)
     step = about.dt / joint["substeps"]
     model.opt.timestep, model.opt.integrator = step, engine().mjtIntegrator.mjINT_RK4
     impedance = [float(value) for value in joint_runs.STIFF.split()]
