@@ -21,7 +21,7 @@ from simgap.greybox.identification import Identified, channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
 from simgap.metrics import is_finite, relative, spread
-from simgap.records import Dataset
+from simgap.records import Channels, Dataset
 
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
 LEFT_OF_PLAIN = 0.05
@@ -57,12 +57,14 @@ def diagnose(
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
     dataset = with_known(with_kinds(dataset, kind), known)
     check_numbers(dataset.test, dataset.channels)
-    identified = identify(dataset.training)
-    dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, dataset.training))
+    training = dataset.training
+    controller = doubts.shows_controller((*training.train, *training.valid), dataset.channels)
+    identified = identify(training, effects=controller is None)
+    dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, training))
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     evidence = [Evidence(one, dataset.channels) for one in identified]
-    doubt = _doubt(evidence, dataset)
+    doubt = (controller,) if controller else _doubt(evidence, dataset.channels)
     left, offers = _left(evidence, dataset)
     trusted = [plant for plant in map(promises.rests_on, evidence) if plant]
     endless = len(trusted) < len(evidence)
@@ -108,12 +110,10 @@ def diagnose(
     return Diagnosis(findings, time.perf_counter() - begin, model)
 
 
-def _doubt(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[str, ...]:
-    """Say why nothing can be named on these records, if so."""
-    training = dataset.training
-    said = [doubts.shows_controller((*training.train, *training.valid), dataset.channels)]
-    said += [doubts.beaten_by_mean(plant.selection, dataset.channels) for plant in evidence]
-    said += [doubts.beaten_by_order(plant.identified, dataset.channels) for plant in evidence]
+def _doubt(evidence: Sequence[Evidence], channels: Channels) -> tuple[str, ...]:
+    """Say why no model of these records can name anything, if so."""
+    said = [doubts.beaten_by_mean(plant.selection, channels) for plant in evidence]
+    said += [doubts.beaten_by_order(plant.identified, channels) for plant in evidence]
     return tuple(sentence for sentence in said if sentence)
 
 

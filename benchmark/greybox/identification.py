@@ -44,17 +44,18 @@ class Identified:
         return FittedPlant.fit(baseline.estimate, baseline, self.plant.experiments)
 
 
-def identify(data: TrainingSet) -> list[Identified]:
-    """Select effects on excerpts of the training data, then fit them to all of it, plant by plant."""
+def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
+    """Select effects (or none) on excerpts of the training data, then fit the model to all of it, plant by plant."""
     channels, experiments = with_velocity(data), data.train + data.valid
     identified = []
     for outputs in plants_of(channels):
         output = outputs[0]
-        settled = settle(data, channels, output) if channels.outputs[output].kind_from == "unknown" else None
+        unsaid = effects and channels.outputs[output].kind_from == "unknown"
+        settled = settle(data, channels, output) if unsaid else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
-        selection = _selected(data, of_kind, outputs, settled)
+        selection = _selected(data, of_kind, outputs, settled) if effects else _plain(data, of_kind, outputs)
         linear = None
-        if channels.plant is None:
+        if effects and channels.plant is None:
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             linear = linear_rival(data, of_kind, selection)
         best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
@@ -88,3 +89,9 @@ def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], s
         if np.mean(np.any(flag(errors, records.mask), axis=2)[left_out]) < STILL_FAR:
             return select(find_baseline(*whole, every_reading=True))
     return selection
+
+
+def _plain(data: TrainingSet, channels: Channels, outputs: tuple[int, ...]) -> Selection:
+    """Take the plain model for the answer."""
+    find = find_baseline if channels.plant is None else find_machine_baseline
+    return Selection.of_none(find(data.train, data.valid, channels, outputs, data.n_init))

@@ -256,4 +256,6 @@ def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, mem
 
 # The compiled functions themselves: numba would work out the types of the terms anew at every call, which takes longer
 # than most simulations. Whoever calls them keeps to the one signature.
-run_body_directly, run_tanks_directly = (f.overloads[f.signatures[0]].entry_point for f in (run_body, run_tanks))
+run_body_directly, run_tanks_directly, follow_motion_directly = (
+    f.overloads[f.signatures[0]].entry_point for f in (run_body, run_tanks, follow_motion)
+)

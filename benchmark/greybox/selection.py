@@ -53,6 +53,11 @@ class Selection:
     compared: Compared
     parts: dict[frozenset[tuple[str, int]], Trial] = field(default_factory=dict)  # with some of the chosen effects only
 
+    @classmethod
+    def of_none(cls, baseline: Baseline) -> Selection:
+        """Choose no effect, and look for none."""
+        return cls(baseline, assess(baseline, baseline.estimate, 0), 0, (), {})
+
     def only(self, terms: Sequence[Term]) -> Trial:
         """Fit some of the chosen effects again without the others; each choice is fitted once."""
         if len(terms) == len(self.trial.terms):

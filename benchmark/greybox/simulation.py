@@ -11,7 +11,14 @@ from jaxtyping import Float
 from numba import cfunc
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
-from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body_directly, run_tanks_directly, transition
+from simgap.greybox.kernels import (
+    SLOTS,
+    TERM,
+    follow_motion_directly,
+    run_body_directly,
+    run_tanks_directly,
+    transition,
+)
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine_directly
 from simgap.greybox.plant import Plant
@@ -135,7 +142,7 @@ class Simulator:
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
         begun[:, self._remembered] = np.clip(start[:, start.shape[1] - len(self._remembered) :], -1.0, 1.0)
         drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
-        follow_motion(
+        follow_motion_directly(
             drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
             self._memory, states,
         )  # fmt: skip
