@@ -6,13 +6,14 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
            "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
 
-GROUND = {"records", "known_plant", "protocol", "registry", "step_form"}
+GROUND = {"records", "known_plant", "protocol", "registry", "step_form", "cores"}
 RUN = {"metrics", "tasks", "results", "running"}
 # Room or module -> what it may import besides itself. "simgap" is the lazy exports of the package.
 MAY_IMPORT: dict[str, set[str]] = {
     "known_plant": set(),
     "records": {"known_plant"},
     "findings": {"records"},
+    "cores": set(),
     "wording": set(),
     "protocol": {"records"},
     "step_form": {"records"},

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from simgap.cores import all_cores
 from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.budget import budgets
@@ -57,6 +58,11 @@ def diagnose(
     dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
     dataset = with_known(with_kinds(dataset, kind), known)
     check_numbers(dataset.test, dataset.channels)
+    with all_cores():
+        return _answer(dataset, seed, profiles, views_too, begin)
+
+
+def _answer(dataset: Dataset, seed: int, profiles: bool, views_too: bool, begin: float) -> Diagnosis:
     training = dataset.training
     controller = doubts.shows_controller((*training.train, *training.valid), dataset.channels)
     identified = identify(training, effects=controller is None)

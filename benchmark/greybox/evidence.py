@@ -85,8 +85,8 @@ class Evidence:
         left, before, listed = list(selection.trial.terms), selection.baseline.squares, []
         while left:
             known = [term for term, _ in listed]
-            fits = [(term, selection.only([*known, term])) for term in left]
-            term, fit = min(fits, key=lambda pair: float(pair[1].blocks.sum()))
+            fits = selection.each_only([[*known, term] for term in left])
+            term, fit = min(zip(left, fits, strict=True), key=lambda pair: float(pair[1].blocks.sum()))
             listed.append((term, (before - fit.estimate.squares) / selection.baseline.squares))
             left.remove(term)
             before = fit.estimate.squares

@@ -12,6 +12,9 @@ from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquat
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 
+MAX_STEPS = 40
+TOLERANCE = 1e-3  # of the variance of the errors: the gain that is not worth another step
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
@@ -30,8 +33,8 @@ def descend(
     theta: np.ndarray,
     local: np.ndarray | None = None,
     fixed: np.ndarray | None = None,
-    max_steps: int = 40,
-    tolerance: float = 1e-3,
+    max_steps: int = MAX_STEPS,
+    tolerance: float = TOLERANCE,
 ) -> Estimate:
     """Fit theta and the numbers of each experiment by Levenberg-Marquardt, within the bounds.
 

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
-from simgap.greybox.fitting import Estimate, descend
+from simgap.cores import side_by_side
+from simgap.greybox.fitting import MAX_STEPS, TOLERANCE, Estimate, descend
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 FINALISTS = 2
-FEW_STEPS, MAX_STEPS = 10, 40  # of a fit until the finalists are compared: with effects, of a plain model
+FEW_STEPS = 10  # of a fit with effects until the finalists are compared
 LARGEST_RATIO = 1e6
 
 
@@ -30,7 +32,7 @@ def fit_plain(
     With a delay it is linear too; `of_terms` holds the parameters of the terms to begin with.
     """
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
-    tried = []
+    begun = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
     linear = np.zeros(plant.size, dtype=bool)
     linear[plant.layout.gains] = linear[plant.layout.offset] = True
@@ -43,11 +45,11 @@ def fit_plain(
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0
         theta[plant.n_linear :] = of_terms
-        solved = descend(problem, theta, fixed=~linear, max_steps=2)
-        tried.append((solved.squares, solved.theta, solved.local))
-    tried.sort(key=lambda trial: trial[0])
+        begun.append(theta)
+    tried = side_by_side(partial(descend, problem, fixed=~linear, max_steps=2), begun)
+    tried.sort(key=lambda fit: fit.squares)
     few = FEW_STEPS if len(of_terms) else MAX_STEPS
-    fits = [descend(problem, theta, local, max_steps=few) for _, theta, local in tried[:FINALISTS]]
+    fits = side_by_side(partial(_go_on, problem, max_steps=few), tried[:FINALISTS])
     best = min(fits, key=lambda fit: fit.squares)
     # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
@@ -59,7 +61,7 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
     plant, records = problem.plant, problem.records
     gains = np.zeros(plant.size, dtype=bool)
     gains[plant.layout.gains] = gains[plant.layout.offset] = True
-    tried = []
+    begun = []
     few = plant.order <= 2
     shapes = plant.machine.shapes(starts[0]) if plant.machine else list(
         denominator_grid(plant, records, coarse=True)
@@ -72,11 +74,16 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
             theta[plant.layout.poles] = shape
             if not plant.imposed and plant.machine is None:
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
-            tried.append(descend(problem, theta, fixed=~gains, max_steps=2, tolerance=1.0))
-    tried.sort(key=lambda trial: trial.squares)
-    fits = [descend(problem, t.theta, t.local, max_steps=max_steps, tolerance=tolerance) for t in tried[:FINALISTS]]
+            begun.append(theta)
+    tried = side_by_side(partial(descend, problem, fixed=~gains, max_steps=2, tolerance=1.0), begun)
+    tried.sort(key=lambda fit: fit.squares)
+    fits = side_by_side(partial(_go_on, problem, max_steps=max_steps, tolerance=tolerance), tried[:FINALISTS])
     best = min(fits, key=lambda fit: fit.squares)
     return descend(problem, best.theta, best.local) if plant.sign_hidden else best
+
+
+def _go_on(problem: Problem, fit: Estimate, max_steps: int, tolerance: float = TOLERANCE) -> Estimate:
+    return descend(problem, fit.theta, fit.local, max_steps=max_steps, tolerance=tolerance)
 
 
 def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:

@@ -49,6 +49,10 @@ class Problem:
         self.least = (RESOLUTION * self._sizes / noise.deviations) ** 2
         self._measured = records.mask[:, :, None]
 
+    def __reduce__(self) -> tuple[type[Problem], tuple[Plant, Records, Noise]]:
+        """Be made anew in another process, where compiled loops have other addresses."""
+        return Problem, (self.plant, self.records, self.noise)
+
     def only(self, experiments: np.ndarray) -> Problem:
         """Return the same problem for some of the experiments."""
         return (

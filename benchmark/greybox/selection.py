@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import TypeVar
+from functools import partial
 
-import numba
-
+from simgap.cores import side_by_side
 from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
 from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of, promising
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 # Log-likelihood ratio that confirms what the readings show already.
 CONFIRMED = 8.0
@@ -60,12 +55,16 @@ class Selection:
 
     def only(self, terms: Sequence[Term]) -> Trial:
         """Fit some of the chosen effects again without the others; each choice is fitted once."""
-        if len(terms) == len(self.trial.terms):
-            return self.trial
-        key = frozenset(term.key for term in terms)
-        if key not in self.parts:
-            self.parts[key] = only(self.baseline, self.trial, terms, self.noise_order)
-        return self.parts[key]
+        return self.each_only([terms])[0]
+
+    def each_only(self, choices: Sequence[Sequence[Term]]) -> list[Trial]:
+        """Fit each of several choices of the effects again without the others."""
+        keys = [frozenset(term.key for term in terms) for terms in choices]
+        new = {key: terms for key, terms in zip(keys, choices, strict=True) if key not in self.parts}
+        new.pop(whole := frozenset(term.key for term in self.trial.terms), None)
+        fits = side_by_side(partial(only, self.baseline, self.trial, self.noise_order), list(new.values()))
+        self.parts.update(zip(new, fits, strict=True))
+        return [self.trial if key == whole else self.parts[key] for key in keys]
 
     def without(self, term: Term) -> Trial:
         """Fit the chosen model again with one term less."""
@@ -135,8 +134,12 @@ class _Search:
     def backward(self, trial: Trial) -> Trial:
         """Take out, one by one, the effects that no longer pass alone against the rest; those that stay do."""
         while trial.terms:
-            smaller = [(term, self._without(trial, term)) for term in trial.terms]
-            enough = [other for term, other in smaller if not passes(self.baseline, term, other, trial)]
+            smaller = side_by_side(partial(without, self.baseline, trial, self.noise_order), trial.terms)
+            enough = [
+                other
+                for term, other in zip(trial.terms, smaller, strict=True)
+                if not passes(self.baseline, term, other, trial)
+            ]
             if not enough:
                 break
             trial = max(enough, key=lambda other: other.score)
@@ -161,7 +164,7 @@ class _Search:
         return assess(self.baseline, estimate, self.noise_order)
 
     def _without(self, trial: Trial, term: Term) -> Trial:
-        return without(self.baseline, trial, term, self.noise_order)
+        return without(self.baseline, trial, self.noise_order, term)
 
 
 def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> bool:
@@ -176,12 +179,12 @@ def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> boo
     return within - without > CONFIRMED and holds_out(baseline, smaller, larger)
 
 
-def without(baseline: Baseline, trial: Trial, term: Term, noise_order: int) -> Trial:
+def without(baseline: Baseline, trial: Trial, noise_order: int, term: Term) -> Trial:
     """Fit a model again with one term less."""
-    return only(baseline, trial, [other for other in trial.terms if other != term], noise_order)
+    return only(baseline, trial, noise_order, [other for other in trial.terms if other != term])
 
 
-def only(baseline: Baseline, trial: Trial, terms: Sequence[Term], noise_order: int) -> Trial:
+def only(baseline: Baseline, trial: Trial, noise_order: int, terms: Sequence[Term]) -> Trial:
     """Fit a model again with some of its terms, from its linear part and from the plain one."""
     plant = baseline.plant.having(terms)
     theta, local = plant.carry(trial.estimate.plant, trial.estimate.theta, trial.estimate.local)
@@ -204,9 +207,6 @@ def compare(
     jacobian = jacobian_of(baseline, estimate)
     before = baseline.squares_of(estimate)
 
-    def begin(term: Term) -> Estimate | None:
-        return extend(baseline, estimate, term, jacobian, FEW_STEPS)
-
     def worth(fit: Estimate) -> bool:
         gained = 0.5 * baseline.n_errors * math.log(before / fit.squares)
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
@@ -215,19 +215,16 @@ def compare(
     finalists = FINALISTS
     if baseline.plant.machine is not None:
         tried, finalists = promising(baseline, estimate, tried, jacobian, PROMISING), FINALISTS_OF_MACHINE
-    begun = [fit for fit in in_threads(begin, tried) if fit is not None]
+    begin = partial(extend, baseline, estimate, jacobian=jacobian, max_steps=FEW_STEPS)
+    begun = [fit for fit in side_by_side(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
     finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
-    compared[key] = tuple(in_threads(lambda fit: assess(baseline, fit, noise_order), finalists))
+    compared[key] = tuple(side_by_side(partial(assess, baseline, noise_order=noise_order), finalists))
     return ranked(list(compared[key]))
 
 
 def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:
     """Go on with fits until all have converged but those that are behind the best by more than their last gain."""
-
-    def go_on(fit: Estimate) -> Estimate:
-        return baseline.fit(fit.plant.terms, [(fit.theta, fit.local)], MORE_STEPS)
-
     fits, gains = list(fits), [math.inf] * len(fits)
     for _ in range(MAX_STEPS // MORE_STEPS):
         costs = [_cost(baseline, fit) for fit in fits]
@@ -235,9 +232,13 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
             i for i, fit in enumerate(fits)
             if not fit.converged and worth(fit) and costs[i] - min(costs) <= gains[i]
         ]  # fmt: skip
-        for i, fit in zip(running, in_threads(go_on, [fits[i] for i in running]), strict=True):
+        for i, fit in zip(running, side_by_side(partial(_go_on, baseline), [fits[i] for i in running]), strict=True):
             fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
     return fits
+
+
+def _go_on(baseline: Baseline, fit: Estimate) -> Estimate:
+    return baseline.fit(fit.plant.terms, [(fit.theta, fit.local)], MORE_STEPS)
 
 
 def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Estimate]:
@@ -247,17 +248,16 @@ def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Es
     best = min(fits, key=lambda fit: _cost(baseline, fit))
     others = [fit for fit in fits if fit is not best]
     best = from_other_poles(baseline, before, best)
-    contained = best.plant.terms[-1].effect.contains
+    return [best, *side_by_side(partial(_from_best, baseline, best), others)]
 
-    def from_best(fit: Estimate) -> Estimate:
-        plant, term = fit.plant, fit.plant.terms[-1]
-        if term.effect.name not in contained:
-            return fit
-        theta, local = plant.carry(best.plant, best.theta, best.local)
-        theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
-        return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
 
-    return [best, *in_threads(from_best, others)]
+def _from_best(baseline: Baseline, best: Estimate, fit: Estimate) -> Estimate:
+    plant, term = fit.plant, fit.plant.terms[-1]
+    if term.effect.name not in best.plant.terms[-1].effect.contains:
+        return fit
+    theta, local = plant.carry(best.plant, best.theta, best.local)
+    theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
+    return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
 
 
 def _cost(baseline: Baseline, fit: Estimate) -> float:
@@ -265,12 +265,3 @@ def _cost(baseline: Baseline, fit: Estimate) -> float:
     n = baseline.n_errors
     parameters = int(fit.plant.free.sum()) + len(fit.local) * len(fit.plant.per_experiment)
     return 0.5 * n * math.log(fit.squares) + 0.5 * parameters * math.log(n)
-
-
-def in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Do the work on all items, on as many threads as this process may use; the compiled loops release the lock."""
-    threads = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]  # a worker's share of the machine
-    if threads < 2:
-        return list(map(work, items))
-    with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, items))

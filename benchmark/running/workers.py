@@ -11,6 +11,8 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from simgap.cores import end_with_parent
+
 _VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -42,7 +44,7 @@ def prepare_worker(limits: Limits) -> None:
     reuse_memory()
     silence()
     os.environ.update(limits.environment)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def threads_per_worker(workers: int) -> int:
@@ -123,11 +125,3 @@ def silence() -> None:
     for stream in (1, 2):
         os.dup2(nowhere, stream)
     os.close(nowhere)
-
-
-def _end_with_parent() -> None:
-    """End this process when its parent ends: a run that is killed cannot stop its workers."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -153,6 +153,13 @@ class Effect(ABC):
     # Functions that the term, or the step, calls.
     helpers: ClassVar[tuple[Callable[..., float], ...]] = ()
 
+    def __eq__(self, other: object) -> bool:
+        """Tell whether the other one is the same effect; none has a state."""
+        return type(self) is type(other)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
     @abstractmethod
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """List the parameters, with bounds in proportion to the signals."""
