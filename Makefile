@@ -52,10 +52,10 @@ $(VENV)/peers-$(VERSION): requirements-peers.lock $(INSTALLED)
 
 test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
-	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
+	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
 
 test-slow: $(INSTALLED)
-	@OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow --numprocesses $(JOBS) --dist worksteal
+	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow --numprocesses $(JOBS) --dist worksteal
 
 # After an interruption, or with one more model, only what is not in results/ yet is run. A failed job (1) is a row of
 # the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.
