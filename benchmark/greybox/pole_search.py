@@ -121,15 +121,19 @@ def larger_denominators(plant: Plant, records: Records, smaller: Estimate) -> It
     """List the poles of a model of lower order with further ones; zeros come after the same poles without them."""
     before = list(smaller.theta[smaller.plant.layout.poles])
     rates = np.geomspace(0.5 / records.duration, 1.5 / records.dt, 5)
+    frequencies = np.geomspace(2 / records.duration, 2.5 / records.dt, 7)
+    swinging = [(2 * damping * w, w * w) for w in frequencies for damping in (0.05, 0.4)]
     if plant.order == len(before):
         yield before
     elif plant.cascade:
         yield from (sorted([*before, rate], reverse=True) for rate in rates)
     elif len(before) % 2 == 0:
+        # With a further real pole; or the slow part of the last section stays, and beside it something swings.
         yield from ([*before, rate] for rate in rates)
+        slow = before[-1] / before[-2] if before[-2] > 0 else 0.0
+        yield from ([*before[:-2], *section, slow] for section in swinging)
     else:
         # The last first-order section becomes one of second order: with a further real pole, or swinging.
         rest, last = before[:-1], before[-1]
         yield from ([*rest, last + rate, last * rate] for rate in rates)
-        yield from ([*rest, 2 * damping * w, w * w] for w in np.geomspace(2 / records.duration, 2.5 / records.dt, 7)
-                    for damping in (0.05, 0.4))  # fmt: skip
+        yield from ([*rest, *section] for section in swinging)

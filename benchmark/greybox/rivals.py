@@ -10,12 +10,15 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.joint import on_joint, with_joint
+from simgap.greybox.leftover import look_for_more
 from simgap.greybox.linear import MAX_ORDER, first_order_hold, scaled
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.selection import BETTER, Selection, select
 from simgap.greybox.trial import MATTERS, score_gain
 from simgap.records import Channels
+
+UNEXPLAINED = 0.05  # of the plain model's squared error: more that the input still predicts
 
 
 def of_better_order(selection: Selection, channels: Channels) -> Selection:
@@ -24,7 +27,7 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
     The order of the plain model is chosen without effects; a saturation, say, makes one lag too few look enough, and
     other effects then stand in for that lag. More parameters must show in most of the held-out blocks.
     """
-    while any(not term.effect.linear for term in selection.trial.terms):
+    while _asks_for_order(selection):
         larger = of_next_order(selection.baseline, channels)
         if larger is None:
             break
@@ -39,12 +42,25 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
     return selection
 
 
+def _asks_for_order(selection: Selection) -> bool:
+    """Tell whether a lag may be missing beside effects; a velocity is one mass's unless that leaves much unexplained."""
+    baseline, chosen = selection.baseline, selection.trial.estimate
+    if baseline.plant.kind == "velocity":
+        left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.squares
+        return left > UNEXPLAINED
+    return any(not term.effect.linear for term in selection.trial.terms)
+
+
 def of_next_order(baseline: Baseline, channels: Channels) -> Baseline | None:
-    """Fit the plain model of one order more; None where the kind of the output gives the order."""
+    """Fit the plain model of one order more; None where the kind of the output gives the order.
+
+    What moves as more than one mass has no place where the forces of one mass act: its velocity is like any output.
+    """
     before, records = baseline.plant, baseline.train
-    if before.kind in ("position", "velocity") or before.order == MAX_ORDER:
+    if before.kind == "position" or before.order == MAX_ORDER:
         return None
-    plant = Plant(before.kind, before.order + 1, before.nu, before.dt, offset=True)
+    kind = "other" if before.kind == "velocity" else before.kind
+    plant = Plant(kind, before.order + 1, before.nu, before.dt, offset=True)
     fit = fit_plain(plant, records, baseline.estimate if plant.order > 2 else None)
     fit = first_order_hold(fit, records, baseline.valid, baseline.n_init) or fit
     return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))

@@ -14,6 +14,7 @@ from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquat
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
 from simgap.greybox.terms import Term
+from simgap.greybox.unfolding import unfolded
 from simgap.registry import EFFECTS
 
 # Score tests below this log-likelihood ratio are not worth a refit.
@@ -99,6 +100,11 @@ def extend(
     plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
+    if term.effect.hides_sign and plant.ny == 1 and plant.machine is None:
+        theta, _ = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        plain = unfolded(baseline.plant, baseline.train)
+        theta[: plant.n_linear] = plain.theta
+        return baseline.fit(plant.terms, [(theta, plain.local)], max_steps)
     if term.effect.moves_poles and plant.machine is None:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
