@@ -14,6 +14,7 @@ from simgap.greybox.leftover import look_for_more
 from simgap.greybox.linear import MAX_ORDER, first_order_hold, scaled
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
+from simgap.greybox.score_test import candidates
 from simgap.greybox.selection import BETTER, Selection, select
 from simgap.greybox.trial import MATTERS, score_gain
 from simgap.records import Channels
@@ -27,43 +28,59 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
     The order of the plain model is chosen without effects; a saturation, say, makes one lag too few look enough, and
     other effects then stand in for that lag. More parameters must show in most of the held-out blocks.
     """
+    more = 1
     while _asks_for_order(selection):
-        larger = of_next_order(selection.baseline, channels)
+        larger = of_higher_order(selection, more, channels)
         if larger is None:
             break
         other = select(larger)
-        before, after = (
-            block_errors(of.trial.estimate, of.baseline.valid, of.baseline.n_init) for of in (selection, other)
-        )
-        as_few = other.trial.cost <= selection.trial.cost and after.mean() < before.mean()
-        if not (as_few or in_most(before - after)) or not is_better(other.trial.estimate, larger, selection):
+        if _is_better_order(other, selection):
+            selection, more = other, 1
+        elif more == 1 and _may_lose_sign(selection.baseline):
+            more = 2  # a resonance takes two
+        else:
             break
-        selection = other
     return selection
 
 
 def _asks_for_order(selection: Selection) -> bool:
-    """Tell whether a lag may be missing beside effects; a velocity is one mass's unless that leaves much unexplained."""
+    """Tell whether a lag may be missing beside effects, or a second mass where one leaves much of a velocity open."""
     baseline, chosen = selection.baseline, selection.trial.estimate
-    if baseline.plant.kind == "velocity":
+    if baseline.plant.kind == "velocity" and not _may_lose_sign(baseline):
         left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.squares
         return left > UNEXPLAINED
-    return any(not term.effect.linear for term in selection.trial.terms)
+    return _may_lose_sign(baseline) or any(not term.effect.linear for term in selection.trial.terms)
 
 
-def of_next_order(baseline: Baseline, channels: Channels) -> Baseline | None:
-    """Fit the plain model of one order more; None where the kind of the output gives the order.
+def _may_lose_sign(baseline: Baseline) -> bool:
+    """Tell whether the readings may have lost their sign: then no plain model of them says anything of the order."""
+    return any(term.effect.hides_sign for term in candidates(baseline))
 
-    What moves as more than one mass has no place where the forces of one mass act: its velocity is like any output.
+
+def of_higher_order(selection: Selection, more: int, channels: Channels) -> Baseline | None:
+    """Fit the plain model of so many orders more; None where the kind of the output gives the order.
+
+    What moves as more than one mass has no place where the forces of one mass act: its velocity is like any output,
+    and the lags that were found beside one mass are order.
     """
-    before, records = baseline.plant, baseline.train
-    if before.kind == "position" or before.order == MAX_ORDER:
+    baseline = selection.baseline
+    kind, order, records, fit = baseline.plant.kind, baseline.plant.order, baseline.train, baseline.estimate
+    if kind == "velocity":
+        kind, more = "other", more + sum(term.effect.adds_pole for term in selection.trial.terms)
+    if kind == "position" or order + more > MAX_ORDER:
         return None
-    kind = "other" if before.kind == "velocity" else before.kind
-    plant = Plant(kind, before.order + 1, before.nu, before.dt, offset=True)
-    fit = fit_plain(plant, records, baseline.estimate if plant.order > 2 else None)
+    for larger in range(order + 1, order + more + 1):
+        plant = Plant(kind, larger, baseline.plant.nu, records.dt, offset=True)
+        fit = fit_plain(plant, records, fit if larger > 2 else None)
     fit = first_order_hold(fit, records, baseline.valid, baseline.n_init) or fit
     return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
+
+
+def _is_better_order(other: Selection, before: Selection) -> bool:
+    """Tell whether effects on a plant of higher order err less on most held-out blocks, or in the mean at no cost."""
+    was, now = (block_errors(of.trial.estimate, of.baseline.valid, of.baseline.n_init) for of in (before, other))
+    as_few = other.trial.cost <= before.trial.cost and now.mean() < was.mean()
+    return (as_few or in_most(was - now)) and is_better(other.trial.estimate, other.baseline, before)
 
 
 def of_better_joint(rigid: Selection, channels: Channels) -> Selection:

@@ -100,14 +100,13 @@ def extend(
     plant = baseline.plant.having([*(t for t in estimate.plant.terms if not term.replaces(t)), term])
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
-    if term.effect.hides_sign and plant.ny == 1 and plant.machine is None:
-        theta, _ = plant.carry(estimate.plant, estimate.theta, estimate.local)
-        plain = unfolded(baseline.plant, baseline.train)
-        theta[: plant.n_linear] = plain.theta
-        return baseline.fit(plant.terms, [(theta, plain.local)], max_steps)
     if term.effect.moves_poles and plant.machine is None:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+        if term.effect.hides_sign and plant.ny == 1:
+            plain = unfolded(baseline.plant, baseline.train)
+            theta = np.concatenate((plain.theta, thetas[0][plant.n_linear :]))
+            return min(fit, baseline.fit(plant.terms, [(theta, plain.local)], max_steps), key=lambda fit: fit.squares)
         if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
             return fit
         # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).

@@ -55,6 +55,7 @@ class ActuatorLag(InputEffect):
     place_in_chain: ClassVar[int] = 70
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     linear: ClassVar[bool] = True
+    adds_pole: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
         "input_delay": (

@@ -138,6 +138,8 @@ class Effect(ABC):
     simulated: ClassVar[bool] = True
     # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.
     linear: ClassVar[bool] = False
+    # A linear model of one order more does the same.
+    adds_pole: ClassVar[bool] = False
     # May explain what otherwise asks for a higher order of the plant.
     instead_of_order: ClassVar[bool] = False
     # The linear plant fitted without it has other poles, so that a fit with it searches for the poles anew.

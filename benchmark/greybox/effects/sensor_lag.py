@@ -26,6 +26,7 @@ class SensorLag(OutputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 8"
     place_in_chain: ClassVar[int] = 110
     linear: ClassVar[bool] = True
+    adds_pole: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
