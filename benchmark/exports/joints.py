@@ -15,7 +15,6 @@ from simgap.exports.subjects import CheckRecord, Subject
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.known_plant import ANGLES
 from simgap.records import UnusableInput
-from simgap.registry import EFFECTS
 
 STANDARD_GRAVITY = 9.81  # m/s^2
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}  # in m, as ANGLES in rad; a velocity's is that per second
@@ -233,9 +232,9 @@ def start_of(subject: Subject, joint: Joint, record: CheckRecord) -> JointStart:
 
 
 def effects_table() -> list[str]:
-    """Write the table of the README: each effect in each of the two, or that this simulator cannot."""
+    """Write the table of the README: the effects that either of the two can hold."""
     lines = ["| effect | `mjcf` | `urdf` |", "|---|---|---|"]
-    for name in EFFECTS:
+    for name in sorted(MJCF):
         cells = [
             f"{there[name][0]} = {there[name][1]} [{there[name][2]}]" if name in there else CANNOT
             for there in (MJCF, URDF)

@@ -73,7 +73,7 @@ class _Reader:
     table: dict[str, Any]
 
     def suite(self) -> Suite:
-        known = ("title", "datasets", "models", "groups", "tasks", "seeds", "timeout", "memory")
+        known = ("title", "datasets", "without", "models", "groups", "tasks", "seeds", "timeout", "memory")
         self._refuse_unknown(self.table, known)
         suite = Suite(
             name=self.path.stem,
@@ -94,8 +94,14 @@ class _Reader:
 
     def _datasets(self) -> tuple[str, ...]:
         given = self._get("datasets", (list, str), "all")
+        without = self._get("without", list, [""])
+        for name in without:
+            if name and name not in DATASETS:
+                raise UnusableInput(f"{self.path}: without: there is no registered data set {name!r}")
         if given == "all":
-            return tuple(DATASETS)
+            return tuple(name for name in DATASETS if name not in without)
+        if "without" in self.table:
+            raise UnusableInput(f'{self.path}: without goes with datasets = "all" only')
         if isinstance(given, str) or not all(isinstance(name, str) for name in given):
             raise UnusableInput(f'{self.path}: datasets must be "all" or a list of names')
         return tuple(name if name in DATASETS else self._near(name) for name in given)

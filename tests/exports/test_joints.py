@@ -13,6 +13,7 @@ from simgap.exports import export as exports
 from simgap.exports.export import export
 from simgap.exports.joints import CHANGES, MJCF, URDF, effects_table
 from simgap.records import UnusableInput
+from simgap.registry import EFFECTS
 from simgap.saved.archive import FittedOn, SavedModel
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -47,7 +48,7 @@ def cart():
 
 
 def test_the_tables_name_effects_and_the_readme_shows_them():
-    assert {*URDF} <= {*MJCF} == {*CHANGES}
+    assert {*URDF} <= {*MJCF} == {*CHANGES} <= {*EFFECTS}
     assert "\n".join(effects_table()) in (Path(exports.__file__).parent / "README.md").read_text(encoding="utf-8")
 
 

@@ -119,6 +119,8 @@ def test_paths_in_a_suite_count_from_its_file(tmp_path):
         ("tasks = [1]", "no task '1'"),
         ("datasets = [1]", "datasets must be"),
         ('datasets = "some"', "datasets must be"),
+        ('without = ["tanks"]', "without: there is no registered data set 'tanks'"),
+        ('datasets = ["gimbal"]\nwithout = ["gimbal"]', 'without goes with datasets = "all" only'),
         ('models = ["arx"]', "models must be"),
         ('[[models]]\nlabel = "x"', "needs a name"),
         ('[[models]]\nname = "arx"\nparams = 3', "needs a name"),
