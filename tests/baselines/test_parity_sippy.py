@@ -60,8 +60,8 @@ def test_sippy_never_finds_a_lower_prediction_error(excess):
 
 
 @pytest.mark.slow
-def test_sippy_never_finds_a_lower_prediction_error_on_a_hundred_systems(excess):
-    above, from_zero, later = np.array([excess(seed) for seed in range(100)]).T
+def test_sippy_never_finds_a_lower_prediction_error_on_300_systems(excess):
+    above, from_zero, later = np.array([excess(seed) for seed in range(300)]).T
     assert above.max() <= EQUAL
     # Errors before the record taken as zero is what SIPPY's OPT minimises, so there it is below us by a hair, and by
     # more where that untruth is large against the noise. Once it has died out, nobody is ahead by half a percent.

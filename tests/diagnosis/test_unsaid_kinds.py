@@ -37,7 +37,7 @@ def told(answer):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rig", "effect"),
-    [case for case in CASES[::6] if case not in ASKED],
+    [case for case in CASES[::3] if case not in ASKED],
 )
 def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
     data = hide(rig, {effect: 1.0} if effect else {}, 0.05, seed=7)

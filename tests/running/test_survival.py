@@ -73,7 +73,7 @@ def kill_at_random(command, out, times, draw):
     return survived
 
 
-@pytest.mark.parametrize("kills", [6, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [6, pytest.param(100, marks=pytest.mark.slow)])
 def test_killed_at_random_moments_the_next_run_finishes_what_is_missing(suite, tmp_path, kills):
     out, seed = tmp_path / "out", random.SystemRandom().randrange(1 << 30)
     chosen = suite(*JOBS, seeds=2)
