@@ -13,6 +13,7 @@ from simgap.diagnosis.side_by_side import SideBySide
 from simgap.diagnosis.unsaid_kinds import with_channels
 from simgap.diagnosis.wrong import wrong
 from simgap.findings import Budget, Cause, Findings, Value, Verdict
+from simgap.greybox.linear_names import linear_names
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.terms import Term
 from simgap.metrics import relative, spread
@@ -155,33 +156,13 @@ def _about(dataset: Dataset, simulated: Dataset, sides: Sequence[SideBySide]) ->
 def linear_numbers(side: SideBySide, dataset: Dataset) -> tuple[LinearNumber, ...]:
     """List the numbers of the linear part, of machine and simulation."""
     plant = side.machine.estimate.plant
-    names = linear_names(side, dataset)
+    names = linear_names(plant, [channel.name for channel in dataset.channels.inputs])
     rows = zip(names, plant.parameters, *side.numbers(side.linear), side.simulation.theta[side.linear], strict=False)
     return tuple(
         LinearNumber(name, unit, *map(float, (value, low, high, theirs)))
         for (name, unit), parameter, value, low, high, theirs in rows
         if not parameter.fixed
     )
-
-
-def linear_names(side: SideBySide, dataset: Dataset) -> list[tuple[str, str]]:
-    """Name the numbers of a linear part, with their units where these follow from the equation."""
-    plant, inputs = side.machine.estimate.plant, [channel.name for channel in dataset.channels.inputs]
-    if plant.machine is not None:
-        from simgap.greybox.machine import NAMES
-
-        poles = [(name.replace("_", " "), "") for name in NAMES]
-        inputs = [plant.machine.known.input]
-    elif plant.joint or plant.order > 2 or plant.cascade:
-        poles = [(parameter.name, "") for parameter in plant.parameters[plant.layout.poles]]
-    else:
-        poles = [("damping over inertia", "1/s"), ("stiffness over inertia", "1/s^2")][: plant.order]
-    taps = len(plant.taps) if plant.machine is None else 1
-    gains_of = [
-        (f"gain of {name}" + (f", tap {i + 1}" if taps > 1 else ""), "") for name in inputs for i in range(taps)
-    ]
-    rest = [(parameter.name, "") for parameter in plant.parameters[plant.layout.gains.stop : plant.n_linear]]
-    return [*poles, *gains_of, *[("offset" if name == "d" else name, unit) for name, unit in rest]]
 
 
 def _errors_as_baseline(found: Findings, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, object]:

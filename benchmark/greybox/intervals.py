@@ -1,29 +1,49 @@
-"""Intervals of the parameters of a fitted plant."""
+"""How well the data fix the parameters of a fitted plant: their covariance and 95 % intervals."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from simgap.greybox.model import FittedPlant
+from simgap.greybox.fitting import Estimate
+from simgap.greybox.noise import Noise
 from simgap.greybox.normal_equations import NormalEquations
 from simgap.greybox.problem import Problem
+from simgap.greybox.samples import Records
+
+if TYPE_CHECKING:
+    from simgap.greybox.model import FittedPlant
 
 BLOCKS = 40
 
 
-def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Compute 95 % intervals of theta, honest for coloured errors and for what the model cannot explain.
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """The covariance of the estimate of theta, from so many degrees of freedom; 0 for what is not estimated."""
 
-    cov = H^-1 (sum over blocks of g g') H^-1, g = J' e of a block (Liang and Zeger 1986); Student's t.
+    covariance: Float[np.ndarray, "p p"]
+    freedom: int
+
+    def reach(self, level: float = 0.95) -> Float[np.ndarray, " p"]:
+        """Return the half width of the interval of each parameter, by Student's t."""
+        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return float(student.ppf(0.5 + level / 2, self.freedom)) * deviations
+
+
+def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertainty | None:
+    """Compute it, honest for coloured errors and for what the model cannot explain; None where no slope is finite.
+
+    cov = H^-1 (sum over blocks of g g') H^-1, g = J' e of a block (Liang and Zeger 1986).
     """
-    estimate, noise = fitted.estimate, fitted.noise
     plant, theta = estimate.plant, estimate.theta
-    jacobian = Problem(plant, fitted.records, noise).jacobian(theta, estimate.local, plant.free)
+    jacobian = Problem(plant, records, noise).jacobian(theta, estimate.local, plant.free)
     white = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
     if not jacobian.finite:
-        return plant.low, plant.high
+        return None
     normal = NormalEquations.of(jacobian, white)
     h, weights, _ = normal.reduced(0.0)
     # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
@@ -36,7 +56,15 @@ def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.nd
     inverse = np.linalg.pinv(h[np.ix_(inside, inside)] / scale / scale[:, None], rcond=1e-12, hermitian=True)
     used = len(g) / max(1, len(g) - 1)
     moved = (g[:, inside] / scale) @ inverse
-    reach = np.full(len(theta), 0.0)
-    deviations = np.sqrt(used * np.sum(moved**2, axis=0)) / scale
-    reach[inside] = student.ppf(0.975, max(2, len(g) - 1)) * deviations
+    covariance = np.zeros((len(theta), len(theta)))
+    covariance[np.ix_(inside, inside)] = used * (moved.T @ moved) / scale / scale[:, None]
+    return Uncertainty(covariance, max(2, len(g) - 1))
+
+
+def intervals(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Compute the 95 % intervals of theta, within its bounds; the bounds where no slope is finite."""
+    plant, theta, known = fitted.estimate.plant, fitted.estimate.theta, fitted.uncertainty
+    if known is None:
+        return plant.low, plant.high
+    reach = known.reach()
     return np.maximum(theta - reach, plant.low), np.minimum(theta + reach, plant.high)
