@@ -14,7 +14,6 @@ from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
-from simgap.greybox.intervals import Uncertainty, uncertainty
 from simgap.greybox.machine import Machine
 from simgap.greybox.noise import Noise
 from simgap.greybox.outliers import Outliers, flag, without_outliers
@@ -23,6 +22,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
+from simgap.greybox.uncertainty import Uncertainty, uncertainty
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 
