@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from simgap.diagnosis.wrong import wrong
 from simgap.findings import Budget, Cause, Findings, Value, Verdict
 from simgap.greybox.linear_names import linear_names
 from simgap.greybox.model import GreyBoxModel
+from simgap.greybox.samples import sizes_of
 from simgap.greybox.terms import Term
 from simgap.metrics import relative, spread
 from simgap.records import Channels, Dataset
@@ -191,9 +193,13 @@ def _budgets(
     """
     n, y = dataset.n_init, np.concatenate([x.y[dataset.n_init :] for x in dataset.test])
     first = np.mean((y - np.concatenate(before)) ** 2, axis=0)
+    rounding = (gains.SMALLEST_ERROR * sizes_of(y)) ** 2
     last = np.mean((y - np.concatenate(after)) ** 2, axis=0)
     divided = []
     for budget, (j, channel) in zip(found.budget, enumerate(dataset.channels.outputs), strict=True):
+        if first[j] <= rounding[j]:
+            divided.append(Budget(channel.name, {}, math.nan, None, math.nan))
+            continue
         shares: dict[str, float] = {}
         side = next((side for side in sides if j in side.machine.outputs), None)
         if side is not None:
