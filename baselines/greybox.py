@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from simgap.greybox.effects.effect import Effect
+from simgap.greybox.effects.effect import Effect, InputEffect
 from simgap.greybox.linear import find_baseline
+from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.position_and_velocity import plants_of
 from simgap.greybox.score_test import add, from_other_poles
 from simgap.greybox.terms import Term
-from simgap.records import TrainingSet, UnusableInput
+from simgap.records import Channel, TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS
 
 
@@ -33,7 +34,8 @@ class GreyBox(GreyBoxModel):
         self.plants = []
         placed = [_place(name, data) for name in self.effects]
         for outputs in plants_of(data.channels):
-            baseline = find_baseline(data.train, data.valid, data.channels, outputs, data.n_init)
+            find = find_baseline if data.channels.plant is None else find_machine_baseline
+            baseline = find(data.train, data.valid, data.channels, outputs, data.n_init)
             estimate = baseline.estimate
             for effect, plant, channel in placed:
                 # What is not simulated is left out of the records by the baseline itself.
@@ -48,9 +50,12 @@ def _place(name: str, data: TrainingSet) -> tuple[Effect, tuple[int, ...] | None
     name, _, channel = name.partition(":")
     effect = EFFECTS[name]()
     inputs, outputs = data.channels.inputs, data.channels.outputs
+    known = data.channels.plant
+    if not channel and isinstance(effect, InputEffect) and known is not None and known.controlled:
+        return effect, None, len(inputs) if effect.on_command else names_of(inputs).index(known.input)
     if not channel:
         return effect, None if effect.port == "input" else plants_of(data.channels)[0], 0
-    names = [c.name for c in (inputs if effect.port == "input" else outputs)]
+    names = names_of(inputs if effect.port == "input" else outputs)
     if channel not in names:
         raise UnusableInput(f"{name}:{channel}: there is no such {effect.port}; known are {', '.join(names)}")
     at = names.index(channel)
@@ -58,3 +63,8 @@ def _place(name: str, data: TrainingSet) -> tuple[Effect, tuple[int, ...] | None
         return effect, None, at
     plant = next(plant for plant in plants_of(data.channels) if at in plant)
     return effect, plant, plant.index(at) if effect.port == "output" else 0
+
+
+def names_of(channels: Sequence[Channel]) -> list[str]:
+    """List the names of channels."""
+    return [channel.name for channel in channels]

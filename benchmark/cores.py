@@ -31,7 +31,7 @@ def cores() -> int:
 
 @contextmanager
 def all_cores() -> Iterator[None]:
-    """Have `side_by_side` use all cores within this block.
+    """Have `on_cores` use all cores within this block.
 
     Its processes are forked from this one when they are first needed, so that they import nothing. Threads gain
     nothing here: half of their time goes by between two compiled loops. Only the main process of a program forks, and
@@ -50,7 +50,7 @@ def all_cores() -> Iterator[None]:
         pool.shutdown(cancel_futures=True)
 
 
-def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+def on_cores(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
     """Do the work on all items and return the results in their order. Work and items must be such as pickle takes."""
     pool = _pool.get()
     if pool is None or len(items) < 2:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.records import Kind, KindFrom
+from simgap.their_simulation import Holds, TheirSimulation
 
 # suspected: effects that passed in training, but their gain on the test split may be chance.
 Verdict = Literal["named", "suspected", "nothing_found", "unexplained"]
@@ -113,6 +114,8 @@ class Cause:
     evidence: share of the plain model's squared error, in training, that the effect explains with those before it;
     gain: share of the squared error on held-out data that is lost again when the effect alone is taken out;
     deciding_experiment: what to record if the effect is only suspected.
+    Of somebody's simulation (`holds` says how it has the effect), evidence is the squared error that the effect makes
+    by itself, as a share of that simulation's; `simulated` are its own values of the parameters, by their names.
     """
 
     effect: str
@@ -129,6 +132,8 @@ class Cause:
     shows_in: tuple[ViewName, ...] = ()
     profiles: tuple[Profile, ...] = ()
     deciding_experiment: str = ""
+    holds: Holds | None = None
+    simulated: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +220,7 @@ class Findings:
     linear: dict[str, Any] | None = None  # as baseline: the linear model of any order, where it does as well as effects
     suspects: tuple[Cause, ...] = ()  # in the place of causes, or beside them
     budget: tuple[Budget, ...] = ()  # of each output
+    simulation: TheirSimulation | None = None  # whose error it is then; else that of the plain linear model
 
     @property
     def effects(self) -> tuple[Cause, ...]:
@@ -246,10 +252,13 @@ class Findings:
             "seed": self.seed,
             "seconds": self.seconds,
         }
+        if self.simulation is not None:
+            answer["simulation"] = self.simulation.to_json()
         return _only_numbers(answer)
 
 
 def _cause(cause: Cause) -> dict[str, Any]:
+    of_simulation = {"holds": cause.holds, "simulated": cause.simulated} if cause.holds else {}
     return {
         "effect": cause.effect,
         "title": cause.title,
@@ -262,6 +271,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "per_experiment": cause.per_experiment,
         "confounded_with": [other.effect for other in cause.confounded_with],
         "separate_by": {other.effect: other.experiment for other in cause.confounded_with},
+        **of_simulation,
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from simgap.data.formats.one_record import Choices, dataset_of, record_of
 from simgap.data.formats.plant_table import with_known
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
+from simgap.data.simulated_columns import split_off
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
@@ -31,10 +32,14 @@ class Recordings:
 
 @dataclass(frozen=True)
 class Reading:
-    """A data set, and in words what was inferred, cut or interpolated on the way to it."""
+    """A data set, and in words what was inferred, cut or interpolated on the way to it.
+
+    `simulated` is the same with the outputs of somebody's simulation, where columns of it were named.
+    """
 
     dataset: Dataset
     said: tuple[str, ...] = ()
+    simulated: Dataset | None = None
 
     def __str__(self) -> str:
         """Tell in one line what was inferred; empty where nothing was."""
@@ -74,17 +79,26 @@ def read(
     resample: float | None = None,
     split_gaps: bool = False,
     known: Mapping[str, Any] | None = None,
+    simulated: Sequence[str] = (),
 ) -> Reading:
-    """Load a data set as `load` does, and say in words what was inferred, cut or interpolated."""
+    """Load a data set as `load` does, and say in words what was inferred, cut or interpolated.
+
+    `simulated` names the columns that hold somebody's simulation of the outputs, in the order of these.
+    """
     choices = Choices(inputs, outputs, dt, name, resample, split_gaps)
-    described = _known(source, choices)
+    described = _known(source, choices, simulated)
     if described is not None:
-        return Reading(with_known(with_kinds(described, kind), known))
-    table = _table(source, choices)
-    name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
-    dataset, said = dataset_of(table, choices, name)
+        dataset, said = described, None
+    else:
+        choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
+        table = _table(source, choices)
+        name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
+        dataset, said = dataset_of(table, choices, name)
+    theirs = None
+    if simulated:
+        dataset, theirs = split_off(dataset, simulated)
     dataset = with_known(with_kinds(dataset, kind), known)
-    return Reading(dataset, (*told(dataset.channels), *said))
+    return Reading(dataset, () if said is None else (*told(dataset.channels), *said), theirs)
 
 
 def read_recordings(source: Any, channels: Channels, dt: float | None = None) -> Recordings:
@@ -105,7 +119,7 @@ def read_recordings(source: Any, channels: Channels, dt: float | None = None) ->
     return Recordings(record.pieces, (), record.channels)
 
 
-def _known(source: Any, choices: Choices) -> Dataset | None:
+def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Dataset | None:
     """Load a source that describes itself; None for a file and a DataFrame."""
     if isinstance(source, str) and source in DATASETS:
         _refuse_columns(choices, f"data set {source}")
@@ -114,7 +128,7 @@ def _known(source: Any, choices: Choices) -> Dataset | None:
         return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
         _refuse_columns(choices, f"folder {Path(source)}")
-        return load_folder(Path(source))
+        return load_folder(Path(source), simulated)
     if not os.path.exists(source):  # noqa: PTH110
         raise UnusableInput(
             f"there is no data set, folder or CSV file called {os.fspath(source)!r}; "

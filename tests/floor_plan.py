@@ -12,8 +12,9 @@ RUN = {"metrics", "tasks", "results", "running"}
 MAY_IMPORT: dict[str, set[str]] = {
     "known_plant": set(),
     "records": {"known_plant"},
-    "findings": {"records"},
     "cores": set(),
+    "their_simulation": set(),
+    "findings": {"records", "their_simulation"},
     "wording": set(),
     "protocol": {"records"},
     "step_form": {"records"},
@@ -32,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "contract": GROUND | RUN | {"data", "saved"},
     "reports": {"records", "metrics", "results", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
-    "diagnosis": GROUND | RUN | {"findings", "data", "greybox", "error_views", "reports"},
+    "diagnosis": GROUND | RUN | {"findings", "their_simulation", "data", "greybox", "error_views", "reports"},
     "simgap": GROUND | RUN | {"data", "diagnosis", "exports", "reports", "saved"},
     "cli": GROUND
     | RUN

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from simgap.cores import all_cores, cores, side_by_side
+from simgap.cores import all_cores, cores, on_cores
 from simgap.data.simulated.rigs import hide
 from simgap.diagnosis.diagnose import diagnose
 
@@ -36,37 +36,37 @@ def dies_elsewhere(item):
 
 
 def of_a_piece(item):
-    return [process for _, process in side_by_side(process_of, range(item))]
+    return [process for _, process in on_cores(process_of, range(item))]
 
 
 def test_results_come_in_the_order_of_the_items_and_from_other_processes():
     with all_cores():
-        items, processes = zip(*side_by_side(process_of, range(20)), strict=True)
+        items, processes = zip(*on_cores(process_of, range(20)), strict=True)
     assert items == tuple(range(20)) and MAIN not in processes
 
 
 def test_outside_of_all_cores_and_on_one_core_everything_runs_here(monkeypatch):
-    assert side_by_side(process_of, [1, 2]) == [(1, MAIN), (2, MAIN)]
+    assert on_cores(process_of, [1, 2]) == [(1, MAIN), (2, MAIN)]
     monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
     with all_cores():
-        assert side_by_side(process_of, [1, 2]) == [(1, MAIN), (2, MAIN)]
+        assert on_cores(process_of, [1, 2]) == [(1, MAIN), (2, MAIN)]
 
 
 def test_a_piece_does_its_own_pieces_itself():
     with all_cores():
-        for processes in side_by_side(of_a_piece, [2, 3]):
+        for processes in on_cores(of_a_piece, [2, 3]):
             assert len(set(processes)) == 1
 
 
 def test_an_exception_of_a_piece_is_raised():
     with all_cores(), pytest.raises(ValueError, match="three"):
-        side_by_side(third_is_odd, range(5))
+        on_cores(third_is_odd, range(5))
 
 
 def test_where_a_process_is_killed_the_work_is_done_here():
     with all_cores():
-        assert side_by_side(dies_elsewhere, range(4)) == [0, 1, 2, 3]
-        assert side_by_side(process_of, range(2)) == [(0, MAIN), (1, MAIN)]
+        assert on_cores(dies_elsewhere, range(4)) == [0, 1, 2, 3]
+        assert on_cores(process_of, range(2)) == [(0, MAIN), (1, MAIN)]
 
 
 def test_cores_are_those_that_the_environment_names_or_that_the_process_is_bound_to(monkeypatch):

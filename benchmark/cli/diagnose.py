@@ -17,7 +17,7 @@ from simgap.cli.options import (
     SamplingTime,
     SplitGaps,
     check_writable,
-    read_data,
+    read_with_simulation,
     write_json,
 )
 
@@ -31,18 +31,22 @@ def diagnose(
     resample: Resample = None,
     split_gaps: SplitGaps = False,
     known: KnownOf = None,
+    simulated: Annotated[
+        list[str] | None,
+        typer.Option(help="Column with the output of your own simulation, which is diagnosed; one for each output."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
     save: Annotated[Path | None, typer.Option(help="Write the model that the answer ends with into this file.")] = None,
 ) -> None:
-    """Show what a linear model of the data gets wrong, name the physical cause and measure what it gains."""
+    """Show what a linear model of the data, or your own simulation, gets wrong, why, and what correcting it gains."""
     from simgap.diagnosis.diagnose import diagnose
     from simgap.saved.archive import save_model
 
     check_writable(json, html, save)
-    dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known)
-    answer = diagnose(dataset, seed=seed, profiles=html is not None)
+    dataset, theirs = read_with_simulation(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
+    answer = diagnose(dataset, seed=seed, profiles=html is not None, simulated=theirs)
     if json is not None:
         write_json(json, answer.to_json())
     if html is not None:

@@ -76,14 +76,30 @@ def read_data(
     known: Sequence[str] | None = None,
 ) -> Dataset:
     """Load the data of a command and print in one line what was inferred, if anything was. Raises UnusableInput."""
+    return read_with_simulation(data, inputs, outputs, dt, kind, resample, split_gaps, known)[0]
+
+
+def read_with_simulation(
+    data: str,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    dt: float | None = None,
+    kind: Sequence[str] | None = None,
+    resample: float | None = None,
+    split_gaps: bool = False,
+    known: Sequence[str] | None = None,
+    simulated: Sequence[str] | None = None,
+) -> tuple[Dataset, Dataset | None]:
+    """Load the data as `read_data` does, and the simulation that stands in other columns. Raises UnusableInput."""
     from simgap.data import read
     from simgap.data.formats.plant_table import parse_known
 
     kinds, machine = parse_kinds(kind or ()), parse_known(known or ())
-    reading = read(data, inputs or (), outputs or (), dt, None, kinds, resample, split_gaps, machine)
+    columns = (inputs or (), outputs or ())
+    reading = read(data, *columns, dt, None, kinds, resample, split_gaps, machine, simulated or ())
     if str(reading):
         typer.echo(str(reading))
-    return reading.dataset
+    return reading.dataset, reading.simulated
 
 
 def check_writable(*files: Path | None) -> None:

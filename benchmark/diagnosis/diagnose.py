@@ -5,17 +5,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from simgap.cores import all_cores
+from simgap.data.formats.plant_table import with_known
+from simgap.data.kinds import with_kinds
+from simgap.data.loading import read
+from simgap.data.simulated_columns import check_simulation, split_off
 from simgap.diagnosis import checks, doubts, gains, promises, unsaid_kinds
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.budget import budgets
 from simgap.diagnosis.odd_runs import odd_runs
-from simgap.error_views.views import views
-from simgap.findings import Findings, Offer, Trace, Verdict, Wrong
+from simgap.diagnosis.their_simulation import judge
+from simgap.diagnosis.wrong import wrong
+from simgap.findings import Findings, Offer, Trace, Verdict
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import Identified, channels_of, identify
@@ -27,9 +33,6 @@ from simgap.records import Channels, Dataset
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
 LEFT_OF_PLAIN = 0.05
 LEFT_OF_EXPLAINED = 0.1
-# Views of the error are listed when chance gives as much in fewer cases than this.
-MORE_THAN_CHANCE = 0.01
-VIEW_SAMPLES = 70_000
 
 
 def diagnose(
@@ -42,27 +45,50 @@ def diagnose(
     views_too: bool = True,
     kind: str | Mapping[str, str] | None = None,
     known: Mapping[str, Any] | None = None,
+    simulated: str | Sequence[str] | Dataset | None = None,
 ) -> Diagnosis:
     """Show what a plain linear model gets wrong on a data set, name the physical cause and measure what it gains.
 
     `data` is a data set, or what `simgap.load` takes; dt in seconds. `seed` draws the resampling of the views and the
     features of the learnable rest. With `profiles` the likelihood profile of every parameter is computed too, as the
     page shows it; without `views_too` the views of the error and its budget are left out. `kind` says what the outputs
-    are, and `known` what a table [plant] would say, as in `simgap.load`. Raises UnusableInput.
+    are, and `known` what a table [plant] would say, as in `simgap.load`. With `simulated` it is somebody's simulation
+    that is diagnosed instead: the columns that hold its outputs, in the order of the measured ones, or a data set of
+    the same experiments with those outputs. Raises UnusableInput.
     """
-    from simgap.data import load
-    from simgap.data.formats.plant_table import with_known
-    from simgap.data.kinds import with_kinds
-
     begin = time.perf_counter()
-    dataset = data if isinstance(data, Dataset) else load(data, inputs=inputs, outputs=outputs, dt=dt)
+    dataset, theirs = _read(data, inputs, outputs, dt, simulated)
     dataset = with_known(with_kinds(dataset, kind), known)
     check_numbers(dataset.test, dataset.channels)
     with all_cores():
-        return _answer(dataset, seed, profiles, views_too, begin)
+        answer = _diagnose(dataset, seed, profiles, views_too)
+        if theirs is not None:
+            answer = judge(answer, dataset, theirs, seed, views_too)
+    return replace(answer, seconds=time.perf_counter() - begin)
 
 
-def _answer(dataset: Dataset, seed: int, profiles: bool, views_too: bool, begin: float) -> Diagnosis:
+def _read(
+    data: Any,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    dt: float | None,
+    simulated: str | Sequence[str] | Dataset | None,
+) -> tuple[Dataset, Dataset | None]:
+    """Load a data set and, where there is one, somebody's simulation of its outputs."""
+    columns = [simulated] if isinstance(simulated, str) else [] if isinstance(simulated, Dataset) else simulated or []
+    theirs = simulated if isinstance(simulated, Dataset) else None
+    if not isinstance(data, Dataset):
+        reading = read(data, inputs, outputs, dt, simulated=columns)
+        data, theirs = reading.dataset, theirs or reading.simulated
+    elif columns:
+        data, theirs = split_off(data, columns)
+    if theirs is not None:
+        check_simulation(data, theirs)
+    return data, theirs
+
+
+def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> Diagnosis:
+    """Diagnose the plain linear model."""
     training = dataset.training
     controller = doubts.shows_controller((*training.train, *training.valid), dataset.channels)
     identified = identify(training, effects=controller is None)
@@ -91,7 +117,7 @@ def _answer(dataset: Dataset, seed: int, profiles: bool, views_too: bool, begin:
         verdict=verdict,
         baseline=_baseline(plain, dataset, before),
         linear=_linear(identified, dataset),
-        wrong=_wrong(plain, dataset, seed) if views_too else (),
+        wrong=wrong(lambda _, x: gains.free_run(plain, x, dataset.n_init), dataset, seed) if views_too else (),
         causes=promised.causes if promised else (),
         runner_up=_runner_up(trusted) if promised else None,
         gain=promised.gain if promised else gains.measure(dataset, before, before),
@@ -113,7 +139,7 @@ def _answer(dataset: Dataset, seed: int, profiles: bool, views_too: bool, begin:
         suspects=promised.suspects if promised else (),
         budget=budgets(promised, plain, dataset, before, seed) if views_too else (),
     )
-    return Diagnosis(findings, time.perf_counter() - begin, model)
+    return Diagnosis(findings, 0.0, model)
 
 
 def _doubt(evidence: Sequence[Evidence], channels: Channels) -> tuple[str, ...]:
@@ -152,18 +178,6 @@ def _linear(identified: Sequence[Identified], dataset: Dataset) -> dict[str, Any
         return None
     model = GreyBoxModel([one.plant if one.linear else one.plain for one in identified])
     return _baseline(model, dataset, [gains.free_run(model, x, dataset.n_init) for x in dataset.test])
-
-
-def _wrong(plain: GreyBoxModel, dataset: Dataset, seed: int) -> tuple[Wrong, ...]:
-    """The views of the plain model's free runs on training and validation data; the test split is not looked at."""
-    experiments, samples = [], 0
-    for x in (*dataset.training.train, *dataset.training.valid):
-        if len(x) > dataset.n_init + 2 and samples < VIEW_SAMPLES:
-            experiments.append(x[:VIEW_SAMPLES])
-            samples += len(experiments[-1])
-    simulated = [gains.free_run(plain, x, dataset.n_init) for x in experiments]
-    seen = views(experiments, simulated, dataset.channels, dataset.n_init, seed)
-    return tuple(view for view in seen if view.chance < MORE_THAN_CHANCE and view.share > 0.01)
 
 
 def _left(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:

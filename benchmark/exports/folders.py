@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from simgap.exports.ranges import ranges_of, to_json
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.records import UnusableInput
 
@@ -48,7 +49,7 @@ def write_folder(subject: Subject, form: str, folder: Path, limit: float) -> Non
         "schema": SCHEMA, "simgap": version("simgap"), "format": form, "model": subject.name,
         "fitted_on": subject.fitted_on.dataset, "dt": subject.fitted_on.dt, "inputs": inputs, "outputs": outputs,
         "units": {c.name: c.unit for c in channels.inputs + channels.outputs}, "limit": limit,
-        "records": records,
+        "records": records, "ranges": to_json(ranges_of(subject.model, channels)),
     }  # fmt: skip
     (folder / ABOUT).write_text(json.dumps(about, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 

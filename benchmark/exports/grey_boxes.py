@@ -80,6 +80,7 @@ class PlantWriter:
             transition(plant.matrix(self.theta), self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
             given[f"RATES{q}"] = -np.diag(plant.matrix(self.theta))
+            given[f"SPRING{q}"] = -plant.matrix(self.theta)[ENTRY if plant.joint else n - 1, :1]
         return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:
@@ -132,13 +133,12 @@ class PlantWriter:
         n, fast = plant.order, min(1, plant.order - 1)
         entry = ENTRY if plant.joint else n - 1
         x, v, h = f"s[{at}]", f"s[{at + fast}]", repr(self.h)
-        matrix = plant.matrix(self.theta)
-        spring = float(-matrix[entry, 0]) if n > 1 else 0.0
+        spring = f"SPRING{q}[0]" if n > 1 else "0.0"
         lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
                  '    """Advance the body by a substep, after so many."""',
                  f"    new = [0.0] * {n}", f"    t = begun * {h}", "    force = 0.0"]  # fmt: skip
         lines += [f"    force += {call}" for _, call in self._forces("force", x, v, h)]
-        lines += ["    hold = 0.0", *self._frictions(x, v, h, f"abs(drive + {spring!r} * {x} - force)")]
+        lines += ["    hold = 0.0", *self._frictions(x, v, h, f"abs(drive + {spring} * {x} - force)")]
         lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
         lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, {fast}, drive, force, change, hold)")
         for term, _ in self._forces("stop", x, v, h):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports.folders import About
-from simgap.exports.joints import Joint, start_of
+from simgap.exports.joints import Joint, numbers_of, start_of
+from simgap.exports.ranges import spread
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.records import UnusableInput
 
@@ -41,8 +42,15 @@ def timestep(subject: Subject, joint: Joint) -> float:
     return subject.fitted_on.dt / SUBSTEPS[joint.rough]
 
 
-def write(root: ET.Element, file: Path, subject: Subject, joint: Joint) -> None:
-    """Write the simulator's file, and joint.json: units, gains, which output is which, where each record starts."""
+def write(root: ET.Element, file: Path, subject: Subject, joint: Joint, remake: Callable[[Subject], Joint]) -> None:
+    """Write the simulator's file, and joint.json: units, gains, which output is which, where each record starts.
+
+    The ranges of what `remake` makes of other parameters stand in joint.json, and as a comment in the file.
+    """
+    ranges = spread(subject, lambda one: numbers_of(remake(one)))
+    listed = "; ".join(f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in ranges.items())
+    if listed:
+        root.insert(1, ET.Comment(f" to draw at random, in SI units: {listed} "))
     ET.indent(root)
     file.write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     fitted = subject.model.plants[0]
@@ -51,6 +59,7 @@ def write(root: ET.Element, file: Path, subject: Subject, joint: Joint) -> None:
         "kind": joint.kind, "si_per_unit": joint.scale, "inertia": joint.inertia, "gains": joint.gains,
         "effort": [one.get("clip") for one in joint.inputs], "substeps": SUBSTEPS[joint.rough],
         "of_velocity": plant.kind == "velocity", "outputs": list(fitted.outputs),
+        "ranges": {name: list(both) for name, both in ranges.items()},
         "velocity_gain": float(theta[plant.layout.velocity][0]) if plant.two_outputs else 1.0,
         "starts": {record.name: asdict(start_of(subject, joint, record)) for record in subject.records},
     }  # fmt: skip

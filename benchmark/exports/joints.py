@@ -98,6 +98,19 @@ def joint_of(subject: Subject, table: Mapping[str, tuple[str, str, str]], simula
     return joint
 
 
+def numbers_of(joint: Joint) -> dict[str, float]:
+    """Name the numbers of a joint, in SI units, that a simulation may draw at random."""
+    named = {"damping": joint.damping, "stiffness": joint.stiffness, "frictionloss": joint.frictionloss,
+             "bias": joint.bias, "drag": joint.drag, "stiffness_x": joint.stiffness_by_position[0],
+             "stiffness_x2": joint.stiffness_by_position[1], "swing": joint.swing}  # fmt: skip
+    named |= {f"gain_{i}": gain for i, gain in enumerate(joint.gains)}
+    for i, one in enumerate(joint.inputs):
+        named |= {f"{name}_{i}": one[name] for name in ("lag", "delay") if name in one}
+        named |= {f"{name}_{i}": one[name][1] for name in ("clip", "reach") if name in one}
+    named |= dict(zip(("lower", "upper"), joint.limits or (), strict=False))
+    return named
+
+
 def _single(subject: Subject, simulator: str) -> FittedPlant:
     fitted, *others = subject.model.plants
     plant = fitted.forecasting

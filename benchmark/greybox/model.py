@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
+from simgap.greybox.uncertainty import Uncertainty, uncertainty
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 
@@ -36,6 +38,7 @@ class FittedPlant:
     experiments: tuple[Experiment, ...]
     outliers: tuple[Outliers, ...] = ()
     usual: UsualStart | None = None
+    read_uncertainty: Uncertainty | None = None  # of a plant that came without its training data
 
     @classmethod
     def fit(cls, start: Estimate, baseline: Baseline, experiments: Sequence[Experiment]) -> FittedPlant:
@@ -54,7 +57,15 @@ class FittedPlant:
     def saved_state(self) -> dict[str, Any]:
         """What simulates; the training data and their errors stay behind."""
         return {"plant": self.estimate.plant, "theta": self.estimate.theta, "noise": self.noise,
-                "outputs": self.outputs, "outliers": self.outliers, "usual": self.usual}  # fmt: skip
+                "outputs": self.outputs, "outliers": self.outliers, "usual": self.usual,
+                "uncertainty": self.uncertainty}  # fmt: skip
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty | None:
+        """The covariance of theta; None where it is not known."""
+        if not self.experiments:
+            return self.read_uncertainty
+        return uncertainty(self.estimate, self.noise, self.records)
 
     @classmethod
     def from_saved(cls, state: dict[str, Any]) -> FittedPlant:
@@ -64,9 +75,14 @@ class FittedPlant:
             raise ValueError("the parameters are not those of such a plant")
         if state["usual"] is not None and len(state["usual"].mean) != plant.order:
             raise ValueError("the usual start is not that of such a plant")
+        known = state.get("uncertainty")  # files of before have none
+        if known is not None and known.covariance.shape != 2 * theta.shape:
+            raise ValueError("the covariance is not that of such parameters")
         nothing = Records.measured(np.empty((0, 0, plant.nu)), np.empty((0, 0, plant.ny)), plant.dt)
         estimate = Estimate(plant, theta, np.empty((0, 0)), nothing.y, np.nan, True)
-        return cls(estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]), state["usual"])
+        return cls(
+            estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]), state["usual"], known
+        )
 
     @property
     def forecasting(self) -> Plant:
@@ -145,7 +161,8 @@ class GreyBoxModel:
     """A model of a data set: one fitted plant for each of its outputs, or for a position with its velocity."""
 
     parts: ClassVar = (  # records in a saved model
-        FittedPlant, Known, KnownPlant, Machine, Noise, Outliers, Plant, PlantScales, SignalScales, Term, UsualStart,
+        FittedPlant, Known, KnownPlant, Machine, Noise, Outliers, Plant, PlantScales, SignalScales, Term, Uncertainty,
+        UsualStart,
     )  # fmt: skip
     saved_as: ClassVar = "greybox"
 

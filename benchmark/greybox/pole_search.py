@@ -8,7 +8,7 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
-from simgap.cores import side_by_side
+from simgap.cores import on_cores
 from simgap.greybox.fitting import MAX_STEPS, TOLERANCE, Estimate, descend
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
@@ -46,10 +46,10 @@ def fit_plain(
         theta[plant.layout.velocity] = 1.0
         theta[plant.n_linear :] = of_terms
         begun.append(theta)
-    tried = side_by_side(partial(descend, problem, fixed=~linear, max_steps=2), begun)
+    tried = on_cores(partial(descend, problem, fixed=~linear, max_steps=2), begun)
     tried.sort(key=lambda fit: fit.squares)
     few = FEW_STEPS if len(of_terms) else MAX_STEPS
-    fits = side_by_side(partial(_go_on, problem, max_steps=few), tried[:FINALISTS])
+    fits = on_cores(partial(_go_on, problem, max_steps=few), tried[:FINALISTS])
     best = min(fits, key=lambda fit: fit.squares)
     # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
@@ -75,9 +75,9 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
             if not plant.imposed and plant.machine is None:
                 theta[: plant.n_linear] = _same_gain(plant, start, theta)
             begun.append(theta)
-    tried = side_by_side(partial(descend, problem, fixed=~gains, max_steps=2, tolerance=1.0), begun)
+    tried = on_cores(partial(descend, problem, fixed=~gains, max_steps=2, tolerance=1.0), begun)
     tried.sort(key=lambda fit: fit.squares)
-    fits = side_by_side(partial(_go_on, problem, max_steps=max_steps, tolerance=tolerance), tried[:FINALISTS])
+    fits = on_cores(partial(_go_on, problem, max_steps=max_steps, tolerance=tolerance), tried[:FINALISTS])
     best = min(fits, key=lambda fit: fit.squares)
     return descend(problem, best.theta, best.local) if plant.sign_hidden else best
 

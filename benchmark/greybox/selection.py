@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from simgap.cores import side_by_side
+from simgap.cores import on_cores
 from simgap.greybox.baseline import MAX_STEPS, Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood, schwarz_order
@@ -62,7 +62,7 @@ class Selection:
         keys = [frozenset(term.key for term in terms) for terms in choices]
         new = {key: terms for key, terms in zip(keys, choices, strict=True) if key not in self.parts}
         new.pop(whole := frozenset(term.key for term in self.trial.terms), None)
-        fits = side_by_side(partial(only, self.baseline, self.trial, self.noise_order), list(new.values()))
+        fits = on_cores(partial(only, self.baseline, self.trial, self.noise_order), list(new.values()))
         self.parts.update(zip(new, fits, strict=True))
         return [self.trial if key == whole else self.parts[key] for key in keys]
 
@@ -134,7 +134,7 @@ class _Search:
     def backward(self, trial: Trial) -> Trial:
         """Take out, one by one, the effects that no longer pass alone against the rest; those that stay do."""
         while trial.terms:
-            smaller = side_by_side(partial(without, self.baseline, trial, self.noise_order), trial.terms)
+            smaller = on_cores(partial(without, self.baseline, trial, self.noise_order), trial.terms)
             enough = [
                 other
                 for term, other in zip(trial.terms, smaller, strict=True)
@@ -216,10 +216,10 @@ def compare(
     if baseline.plant.machine is not None:
         tried, finalists = promising(baseline, estimate, tried, jacobian, PROMISING), FINALISTS_OF_MACHINE
     begin = partial(extend, baseline, estimate, jacobian=jacobian, max_steps=FEW_STEPS)
-    begun = [fit for fit in side_by_side(begin, tried) if fit is not None]
+    begun = [fit for fit in on_cores(begin, tried) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
     finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
-    compared[key] = tuple(side_by_side(partial(assess, baseline, noise_order=noise_order), finalists))
+    compared[key] = tuple(on_cores(partial(assess, baseline, noise_order=noise_order), finalists))
     return ranked(list(compared[key]))
 
 
@@ -232,7 +232,7 @@ def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], 
             i for i, fit in enumerate(fits)
             if not fit.converged and worth(fit) and costs[i] - min(costs) <= gains[i]
         ]  # fmt: skip
-        for i, fit in zip(running, side_by_side(partial(_go_on, baseline), [fits[i] for i in running]), strict=True):
+        for i, fit in zip(running, on_cores(partial(_go_on, baseline), [fits[i] for i in running]), strict=True):
             fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
     return fits
 
@@ -248,7 +248,7 @@ def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Es
     best = min(fits, key=lambda fit: _cost(baseline, fit))
     others = [fit for fit in fits if fit is not best]
     best = from_other_poles(baseline, before, best)
-    return [best, *side_by_side(partial(_from_best, baseline, best), others)]
+    return [best, *on_cores(partial(_from_best, baseline, best), others)]
 
 
 def _from_best(baseline: Baseline, best: Estimate, fit: Estimate) -> Estimate:

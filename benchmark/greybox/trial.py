@@ -134,7 +134,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
-    return of_many or in_most(gain)
+    return bool(of_many) or in_most(gain)
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:

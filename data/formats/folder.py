@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from simgap.data.formats.csv_files import read_csv
@@ -10,12 +12,19 @@ from simgap.data.formats.description import FILE, Description, read_description
 from simgap.data.formats.plant_table import check_records
 from simgap.data.formats.sampling import check_time
 from simgap.data.splits import assemble, hold_out_tails
-from simgap.records import Dataset, Experiment, UnusableInput
+from simgap.records import Channel, Dataset, Experiment, UnusableInput
 
 
-def load_folder(folder: Path) -> Dataset:
-    """Read the data set in `folder`. Raises UnusableInput when any of its files cannot be used."""
+def load_folder(folder: Path, more: Sequence[str] = ()) -> Dataset:
+    """Read the data set in `folder`, with `more` columns of its files behind the outputs that it describes.
+
+    Raises UnusableInput when any of its files cannot be used.
+    """
     described = read_description(folder / FILE)
+    known = [channel.name for channel in described.channels.outputs]
+    added = tuple(Channel(column) for column in more if column not in known)
+    channels = replace(described.channels, outputs=described.channels.outputs + added)
+    described = replace(described, channels=channels)
     files = {split: _matching(folder, split, pattern) for split, pattern in described.splits.items()}
     names = _experiment_names(folder, files)
     records = {

@@ -11,6 +11,7 @@ import numpy as np
 
 from simgap.data.formats.description import FILE, NOT_WRITTEN, SPLITS, check_columns, columns_of
 from simgap.data.formats.folder import natural_order
+from simgap.data.formats.plant_writing import plant_lines
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 
 
@@ -81,6 +82,8 @@ def _toml(dataset: Dataset, time: str | None) -> str:
             if channel.kind_from in NOT_WRITTEN:
                 lines.append(f"kind_from = {_quoted(channel.kind_from)}")
     lines += ["", "[splits]", *(f'{split} = "{split}/*.csv"' for split in SPLITS)]
+    if dataset.channels.plant is not None:
+        lines += plant_lines(dataset.channels.plant, dataset.channels)
     return "\n".join(lines) + "\n"
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from simgap import wording
 from simgap.findings import Cause, Findings, Wrong
-from simgap.reports.diagnosis import figures, numbers, words
+from simgap.reports.diagnosis import figures, numbers, their_simulation, words
 from simgap.reports.diagnosis.traces import choose
 from simgap.reports.rendering import printable
 
@@ -55,6 +55,7 @@ def diagnosis_page(findings: Findings) -> str:
         "numbers": numbers,
         "wording": wording,
         "words": words,
+        "theirs": their_simulation,
         "colour_of": figures.colour_of,
         "budget": plots.draw(figures.budget_figure(findings)),
         "traces": _traces(findings, plots),

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from simgap.findings import Budget, Cause, Findings
-from simgap.reports.diagnosis import numbers, words
+from simgap.reports.diagnosis import numbers, their_simulation, words
 from simgap.reports.rendering import printable
 from simgap.wording import amount, percent
 
@@ -21,7 +21,7 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
     """
     paragraphs = [
         *_wrapped(f"{findings.dataset}: {words.headline(findings)}", width),
-        *_section("Plain linear model", _linear(findings.baseline, findings), width),
+        *_section(*_diagnosed(findings), width),
         *_section("Best linear model", list(_linear(findings.linear, findings)) if findings.linear else [], width),
         *_section("What it gets wrong", _wrong(findings), width),
     ]
@@ -29,13 +29,17 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         for i, cause in enumerate(causes, start=1):
             title = f"{called} {i}: {words.cause_title(cause, findings)}"
             paragraphs += _section(title, _cause(cause, findings), width)
+    paragraphs += _section("Linear part", their_simulation.linear_part(findings), width)
     if second := words.runner_up(findings):
         paragraphs += _section("Runner-up", [second], width)
-    if findings.effects:
-        title = "Free-run RMSE on the test experiments" + (", with the suspects" if not findings.causes else "")
+    if findings.effects or (findings.simulation and findings.simulation.linear_differs):
+        title = "Free-run RMSE on the test experiments" + (
+            ", with the suspects" if findings.suspects and not findings.causes else ""
+        )
         paragraphs += _section(title, _gain(findings), width)
     for budget in findings.budget:
-        title = f"Where the squared error of {budget.output} goes: shares of the plain model's on the test experiments"
+        owner = their_simulation.owner_of(findings)
+        title = f"Where the squared error of {budget.output} goes: shares of {owner} on the test experiments"
         paragraphs += _section(title, _budget(budget, findings), width)
         if budget.mean_absolute_errors:
             title = f"Mean absolute error of {budget.output} on the test experiments, each cause beside those before it"
@@ -62,6 +66,13 @@ def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     )
 
 
+def _diagnosed(findings: Findings) -> tuple[str, Iterator[str]]:
+    """Describe the model whose error is diagnosed."""
+    if findings.simulation:
+        return "Your simulation", their_simulation.errors(findings)
+    return "Plain linear model", _linear(findings.baseline, findings)
+
+
 def _linear(model: dict[str, Any], findings: Findings) -> Iterator[str]:
     yield f"order {words.orders(model.get('order', 'unknown'))}"
     for name, rmse in model.get("rmse", {}).items():
@@ -79,7 +90,8 @@ def _wrong(findings: Findings) -> list[str]:
 def _cause(cause: Cause, findings: Findings) -> Iterator[str]:
     yield cause.text
     for parameter in cause.parameters:
-        yield f"{parameter.name} = {numbers.estimate(parameter)} ({numbers.interval(parameter)})"
+        value = f"{parameter.name} = {numbers.estimate(parameter)} ({numbers.interval(parameter)})"
+        yield value + their_simulation.simulated(cause, parameter)
     yield words.evidence(cause)
     for other in cause.confounded_with:
         yield f"These data do not tell it from {other.title} - to separate them: {other.experiment.rstrip('.')}."

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from simgap.findings import Budget, Cause, Findings, Wrong
+from simgap.reports.diagnosis import their_simulation
 from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
@@ -19,10 +20,7 @@ def headline(findings: Findings) -> str:
     if findings.doubts:
         return f"Nothing is named. {findings.doubts[0]}"
     if findings.verdict == "nothing_found":
-        return (
-            "Nothing found: no effect of the catalogue makes the plain linear model simulate these data better, and "
-            "the input predicts hardly anything more of its error."
-        )
+        return their_simulation.nothing_found(findings)
     if findings.verdict == "unexplained":
         return (
             "Something is there, but nothing in the catalogue explains it: "
@@ -41,7 +39,12 @@ def headline(findings: Findings) -> str:
             f"Suspected, not shown: {listed}. The training data ask for {them}, but the test experiments {says}: "
             f"with {them} the free-run error {change}."
         )
-    said = f"The simulation errs because of {listed}; with {them} the free-run error on the test experiments {change}."
+    whose, corrected = ("Your", "corrected,") if findings.simulation else ("The", f"with {them}")
+    wrong_numbers = findings.simulation is not None and findings.simulation.linear_differs
+    listed += ", and of numbers of its linear part" * wrong_numbers
+    said = (
+        f"{whose} simulation errs because of {listed}; {corrected} the free-run error on the test experiments {change}."
+    )
     if not findings.suspects:
         return said
     return f"{said} Suspected besides, not shown: {_listed(findings.suspects, findings)}."
@@ -60,6 +63,8 @@ def cause_title(cause: Cause, findings: Findings) -> str:
 
 def evidence(cause: Cause) -> str:
     """Say what the effect explains, in training and held out, in one or two sentences."""
+    if cause.holds:
+        return their_simulation.evidence(cause)
     held_out = (
         f"on held-out data the squared error is {percent(cause.gain)} smaller with it than without"
         if cause.gain > 0
@@ -85,6 +90,8 @@ def deciding(cause: Cause, findings: Findings) -> str:
 
 def with_effects(findings: Findings) -> str:
     """Name the model that the gain is of: with the causes, or with the suspects."""
+    if findings.simulation:
+        return "corrected"
     return "with the suspects" if findings.verdict == "suspected" else "with the causes"
 
 
@@ -103,6 +110,7 @@ def runner_up(findings: Findings) -> str:
 def titles_of(findings: Findings) -> dict[str, str]:
     """Map the names of causes in a budget to their titles."""
     titles = {cause.effect: cause_title(cause, findings) for cause in findings.causes}
+    titles["linear_part"] = "numbers of the linear part"
     return titles | {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in findings.causes}
 
 

@@ -1,10 +1,15 @@
 """The table [plant] of a dataset.toml: what it says, in SI units, and one sentence for each that cannot be used."""
 
+import tomllib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import simgap
 from simgap.data.formats.plant_table import parse_known, read_plant
+from simgap.data.formats.plant_writing import plant_lines
+from simgap.data.simulated.rigs import hide
 from simgap.records import Channel, Channels, UnusableInput
 
 SERVO = Channels(
@@ -34,6 +39,36 @@ def test_numbers_come_with_units_and_doubted_ones_with_an_interval():
     assert plant.mass.certain and plant.mass.value == 0.5
     assert not plant.damping.certain and plant.damping.value == pytest.approx(0.2)
     assert plant.input == "force"
+
+
+TICKS = Channels((Channel("goal", "ticks"), Channel("m", "kg")), (Channel("q", "ticks", "position"),))
+MIXED = Channels((Channel("goal", "ticks"), Channel("m", "kg")), (Channel("q", "deg", "position"),))
+
+
+@pytest.mark.parametrize(
+    ("channels", "table"),
+    [
+        (SERVO, TABLE),
+        (SERVO, {**TABLE, "hangs_at": 0.3, "gravity": 1.62}),
+        (CART, {"mass": "500 g", "damping": {"low": 0.1, "high": 0.3}}),
+        (CART, {"inertia": {"low": 1.0, "value": 1.2, "high": 2.0}}),
+        (TICKS, {"mass": "m", "ticks_per_turn": 4096, "controller": {"goal": "goal", "gain": 3, "derivative": 0.1}}),
+        (MIXED, {"mass": "m", "ticks_per_turn": 4096, "controller": {"goal": "goal", "gain": {"low": 1, "high": 2}}}),
+    ],
+)
+def test_a_table_that_is_written_is_read_as_the_same(channels, table):
+    plant = read_plant(table, channels, "d")
+    written = tomllib.loads("\n".join(plant_lines(plant, channels)))["plant"]
+    again = read_plant(written, channels, "d")
+    assert again.goal_factor == pytest.approx(plant.goal_factor, rel=1e-14)
+    assert again.radian == pytest.approx(plant.radian, rel=1e-14)
+    assert replace(again, goal_factor=plant.goal_factor, radian=plant.radian) == plant
+
+
+def test_a_saved_data_set_keeps_what_is_known_of_its_machine(tmp_path):
+    data = hide("servo", {"torque_foldback": 1.0})
+    simgap.save(data, tmp_path / "servo")
+    assert simgap.load(tmp_path / "servo").channels.plant == data.channels.plant
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_a_plain_rig_is_the_exact_discretisation_of_its_linear_equation(rig):
         a = np.array([[-r.outflow, r.upper], [0.0, -r.upper]])
         b = np.array([[0.0], [r.gain]] if r.upper else [[r.gain], [0.0]])
     else:
-        a, b = np.array([[0.0, 1.0], [-r.stiffness, -r.damping]]), np.array([[0.0], [r.gain]])
+        a, b = np.array([[0.0, 1.0], [-r.stiffness - r.loop * r.gain, -r.damping]]), np.array([[0.0], [r.gain]])
     a, b, *_ = cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), r.dt)  # the input is held
     rows_of = {"position": [1.0, 0.0], "velocity": [0.0, 1.0], "level": [1.0, 0.0]}
     c = np.array([rows_of[output.kind] for output in r.outputs])  # [ny, 2]

@@ -42,7 +42,10 @@ def plants_for(effect):
     return [name for name in on_all if name != "imposed" or EFFECTS[effect].role not in ("stop", "rim", "outflow")]
 
 
-FORECAST = [name for name in EFFECTS if EFFECTS[name].simulated and EFFECTS[name].time_power is None]
+# One that acts on the command of a controller inside has no plant here: such machines are not exported.
+FORECAST = [
+    name for name in EFFECTS if EFFECTS[name].simulated and EFFECTS[name].time_power is None and plants_for(name)
+]
 
 
 def check_on(plant, effect):

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from simgap.data.formats.plant_table import read_plant
+from simgap.data.simulated.rigs import hide, physical
+from simgap.diagnosis.diagnose import diagnose
 from simgap.greybox.machine import INERTIA, NAMES
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.score_test import extend
 from simgap.greybox.terms import Term
 from simgap.records import Channel, Channels, Experiment
-from simgap.registry import EFFECTS
+from simgap.registry import EFFECTS, MODELS
 
 DT, FINE = 0.01, 20
 
@@ -137,3 +139,24 @@ def test_of_a_machine_without_a_known_mass_the_inertia_is_one():
     baseline = find_machine_baseline([Experiment("a", x.u[:, :1], x.y, x.dt)], [], channels, (0,), 10)
     assert baseline.plant.parameters[INERTIA].fixed
     assert numbers(baseline)["gain"] == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("strength", "seed"), [(1.0, 1), (0.25, 2)])
+def test_a_torque_that_folds_back_at_large_errors_is_named_with_its_size(strength, seed):
+    answer = diagnose(hide("servo", {"torque_foldback": strength}, noise=0.02, seed=seed), views_too=False)
+    assert [(cause.effect, cause.channel) for cause in answer.causes] == [("torque_foldback", "controller")]
+    error, lost = answer.causes[0].parameters
+    assert error.value == pytest.approx(physical("servo", {"torque_foldback": strength})["torque_foldback"], rel=0.05)
+    assert lost.value == pytest.approx(0.6, abs=0.02)
+
+
+def test_nothing_is_named_on_a_servo_that_hides_nothing():
+    assert diagnose(hide("servo", {}, seed=5), views_too=False).verdict == "nothing_found"
+
+
+def test_a_grey_box_with_an_effect_by_name_knows_the_machine():
+    model = MODELS["greybox"](effects=("torque_foldback",))
+    model.fit(hide("servo", {"torque_foldback": 1.0}, noise=0.0).training, 0)
+    plant = model.plants[0].estimate.plant
+    assert plant.machine is not None
+    assert np.std(model.plants[0].estimate.errors) < 0.01 * np.std(model.plants[0].records.y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxtyping import Float
 from simgap.exports.folders import About
 from simgap.exports.formats import python
 from simgap.exports.formats.control import imported
+from simgap.exports.ranges import variants
 from simgap.exports.subjects import CheckRecord, Subject, refusal_of_step
 from simgap.exports.texts import numbers
 
@@ -26,12 +28,15 @@ class Plant(gymnasium.Env):
     The observation holds the outputs after it{when}, then the target that the reward asks for:
     minus the mean square of (output - target) over the outputs' range. `reset(seed=..)` draws the target from that
     range; options: "start", a state (at rest by default), and "target". An episode ends after `horizon` samples.
+
+    With randomise=True every episode has a plant of its own, drawn from VARIANTS: the parameters as a repeat of the
+    experiments would find them. options "variant": its number, or None for the model that was fitted.
     """
 
     metadata = {{"render_modes": [], "render_fps": max(1, round(1 / DT))}}
 
-    def __init__(self, horizon=500, render_mode=None):
-        self.horizon, self.render_mode = horizon, render_mode
+    def __init__(self, horizon=500, render_mode=None, randomise=False):
+        self.horizon, self.render_mode, self.randomise, self.numbers = horizon, render_mode, randomise, FITTED
         self.action_space = gymnasium.spaces.Box(np.array(LOWEST_INPUT), np.array(LARGEST_INPUT), dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2 * len(OUTPUTS),), dtype=np.float64)
 
@@ -40,12 +45,16 @@ class Plant(gymnasium.Env):
         options = options or {{}}
         drawn = self.np_random.uniform(LOWEST_OUTPUT, LARGEST_OUTPUT)
         self.target = np.array(options.get("target", drawn), dtype=np.float64)
+        drawn = int(self.np_random.integers(len(VARIANTS))) if self.randomise and VARIANTS else None
+        variant = options.get("variant", drawn)
+        self.numbers = FITTED if variant is None else VARIANTS[variant]
         self.state, self.samples = list(options.get("start", REST)), 0
         middle = np.clip(0.0, self.action_space.low, self.action_space.high)
         return self._observation(self._outputs(middle)), {{}}
 
     def step(self, action):
         inputs, outputs = [float(value) for value in action], [0.0] * len(OUTPUTS)
+        globals().update(self.numbers)
         step(self.state, inputs, outputs)
         y = np.array(outputs) if DIRECT else self._outputs(action)
         self.samples += 1
@@ -56,6 +65,7 @@ class Plant(gymnasium.Env):
     def _outputs(self, action):
         """Read the outputs at the present sample; the state stays."""
         outputs = [0.0] * len(OUTPUTS)
+        globals().update(self.numbers)
         step(list(self.state), [float(value) for value in action], outputs)
         return np.array(outputs)
 
@@ -77,9 +87,16 @@ def write(subject: Subject, folder: Path) -> None:
     limits = {"LOWEST_INPUT": subject.input_range[0], "LARGEST_INPUT": subject.input_range[1],
               "LOWEST_OUTPUT": y[0], "LARGEST_OUTPUT": y[1]}  # fmt: skip
     lines = "".join(f"{name} = [{numbers(value)}]\n" for name, value in limits.items())
+    lines += f"FITTED = {{{', '.join(f'{name!r}: {name}' for name in form.constants)}}}\n"
+    lines += f"VARIANTS = [{''.join(_variant(one) for one in variants(subject))}]\n"
     when = ", which it changes at once" if form.direct else ", at the next sample"
     texts = python.parts(subject, IMPORTS), f"DIRECT = {form.direct}\n", lines, "\n\n", form.source
     (folder / FILE).write_text("".join(texts) + ENVIRONMENT.format(when=when), encoding="utf-8")
+
+
+def _variant(constants: Mapping[str, np.ndarray]) -> str:
+    listed = ", ".join(f"{name!r}: [{', '.join(repr(float(v)) for v in of)}]" for name, of in constants.items())
+    return f"\n    {{{listed}}},"
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:

@@ -90,7 +90,7 @@ def write(subject: Subject, folder: Path) -> None:
     section = ET.SubElement(root, "actuator")
     for actuator in actuators(joint, "joint", step):
         ET.SubElement(section, "general", actuator)
-    joint_runs.write(root, folder / FILE, subject, joint)
+    joint_runs.write(root, folder / FILE, subject, joint, lambda one: joint_of(one, MJCF, "mjcf"))
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:

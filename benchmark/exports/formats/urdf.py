@@ -56,7 +56,7 @@ def write(subject: Subject, folder: Path) -> None:
     clips = [abs(gain) * one["clip"][1] for gain, one in zip(joint.gains, joint.inputs, strict=True) if "clip" in one]
     effort = sum(clips) if len(clips) == len(joint.gains) else FAR
     ET.SubElement(made, "limit", lower=repr(low), upper=repr(high), effort=repr(effort), velocity=repr(FAR))
-    joint_runs.write(root, folder / FILE, subject, joint)
+    joint_runs.write(root, folder / FILE, subject, joint, _joint)
 
 
 def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N ny"]:

@@ -20,6 +20,7 @@ class Hidden(NamedTuple):
     tank: float | None
     tanks: float | None
     arm: float | None = None
+    servo: float | None = None
 
 
 CATALOGUE = {
@@ -33,9 +34,10 @@ CATALOGUE = {
     "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, None, None),
     "inner_saturation": Hidden("inner_limit", "U, upwards, behind a lag", 0.8, 1.0, 1.0, 4.0, 4.0),
+    "torque_foldback": Hidden("fold", "Y, error of the controller", None, None, None, None, None, None, 0.15),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
-    "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0),
+    "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0, 10.0),
     "stribeck_friction": Hidden("stribeck", "L/s^2 at high speed", 0.4, 40.0, 8.0, None, None),
     "load_friction": Hidden("load_share", "share of the load", 0.3, 0.3, 0.3, None, None),
     "quadratic_drag": Hidden("drag", "1/L", 1.5, 0.3, 0.2, None, None),
@@ -87,7 +89,7 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
         sizes[name] = strength * strong
         if row.field == "rate":
             sizes[name] = strong / strength if strength > 0 else inf
-        elif row.field in {"limit", "inner_limit", "sensor_limit", "rim", "stop"}:
+        elif row.field in {"limit", "inner_limit", "sensor_limit", "rim", "stop", "fold"}:
             full = RIGS[rig].largest_input if row.field in {"limit", "inner_limit"} else RIGS[rig].reach
             sizes[name] = full / (1 + strength * (full / strong - 1)) if strength > 0 else inf
         elif row.field == "absolute":

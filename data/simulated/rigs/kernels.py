@@ -63,6 +63,9 @@ class Body(NamedTuple):
     stop: float  # L from the centre, each way; infinite is off
     push: float  # 1/s, negative damping at the centre
     push_width: float  # L from the centre to where it turns into damping
+    loop: float  # 1 where a position controller inside acts on w - x, 0 where w is the drive itself
+    fold: float  # L, error of that controller beyond which its torque falls; infinite is off
+    fold_lost: float  # share of the torque that is lost at twice that error
 
 
 class Tanks(NamedTuple):
@@ -159,6 +162,15 @@ def friction(p, w, x, v):
 
 
 @njit(cache=True)
+def controlled(p, e):
+    """Turn the error of the controller into its command, which falls back where the error is large."""
+    far = abs(e) / p.fold
+    if far <= 1.0:
+        return e
+    return (p.fold if e > 0.0 else -p.fold) * (1.0 - p.fold_lost * min(far - 1.0, 1.0))
+
+
+@njit(cache=True)
 def force(p, w, other, t, x, v, z):
     """Sum all forces but dry friction; w and `other`, a force from outside, are those of the time t."""
     total = other + p.load - v * (p.damping + p.drag * abs(v)) - p.hysteresis * z
@@ -173,6 +185,8 @@ def force(p, w, other, t, x, v, z):
         total -= p.position_force * sin(2 * pi * x / p.position_period + p.position_phase)
     if p.periodic != 0.0:
         total += p.periodic * sin(2 * pi * p.frequency * t + p.phase)
+    if p.loop != 0.0:
+        w = controlled(p, w - x)
     return total + gain * w
 
 

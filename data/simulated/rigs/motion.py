@@ -13,6 +13,7 @@ from simgap.data.simulated.rigs.kernels import Body, Drive, Tanks, fill, move
 from simgap.data.simulated.rigs.plants import Rig
 
 SLIP = 0.6  # of a sticking valve: the jump as a share of the band
+FOLD_LOST = 0.6  # of a torque that folds back: the share that is lost at twice the error where it begins
 INNER_LAG = 5.0  # samples, of the lag before a limit
 
 
@@ -35,6 +36,7 @@ def simulate_motion(
         return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
     known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
     known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7, "stop": size.get("stop", inf)}
+    known |= {"fold": size.get("fold", inf), "fold_lost": FOLD_LOST}
     body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
     motion = move(body, drive, u, other, first, second, rig.dt, substeps)
     return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from simgap.known_plant import Known, KnownPlant
 from simgap.records import Channel, Channels
 
 
@@ -11,7 +12,8 @@ from simgap.records import Channel, Channels
 class Rig:
     """A plant before anything is hidden in it. U is its unit of input, L of length or level, Y of its first output.
 
-    With `outflow` 0 it is a body: x'' = gain u - damping x' - stiffness x. Otherwise it is a tank, level' =
+    With `outflow` 0 it is a body: x'' = gain u - damping x' - stiffness x, where a `loop`
+    puts u - x in the place of u. Otherwise it is a tank, level' =
     gain u - outflow level, or two, of which the lower is measured.
     """
 
@@ -26,6 +28,7 @@ class Rig:
     stiffness: float = 0.0  # 1/s^2
     outflow: float = 0.0  # 1/s
     upper: float = 0.0  # 1/s, outflow of the upper tank, if there is one
+    loop: float = 0.0  # 1: the input is the goal of a position controller inside, of gain 1 N m per unit, inertia 1
     start: tuple[float, float] = (0.0, 0.0)  # spread of the initial x and v in L and L/s; tanks: of the levels
     # What the effects need besides their strength.
     breakaway: float = 2.0  # Stribeck: friction at rest as a multiple of that at high speed
@@ -43,8 +46,10 @@ class Rig:
 
     @property
     def channels(self) -> Channels:
-        """The columns of its recordings."""
-        return Channels((self.input,), self.outputs)
+        """The columns of its recordings, and of a servo what is known of it."""
+        one = Known(1.0, 1.0, 1.0)
+        servo = KnownPlant(self.input.name, controlled=True, gain=one, inertia=one) if self.loop else None
+        return Channels((self.input,), self.outputs, servo)
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -92,6 +97,10 @@ RIGS = {
         Rig(
             "arm", 0.02, Channel("torque", "N m"), (Channel("angle", "rad", "position"),),
             gain=8.0, amplitude=3.0, reach=2.5, damping=3.0, start=(0.4, 1.0), frequency=0.7, outlier=3.0,
+        ),
+        Rig(
+            "servo", 0.01, Channel("goal", "rad"), (Channel("angle", "rad", "position"),),
+            gain=300.0, amplitude=1.5, reach=1.5, damping=25.0, loop=1.0, start=(0.1, 0.3), frequency=0.7, outlier=2.0,
         ),
     )
 }  # fmt: skip
