@@ -36,12 +36,17 @@ def _settled(
     plant: Plant, records: Records, signs: Float[np.ndarray, "E T 1"], smaller: Estimate | None
 ) -> tuple[Estimate, Float[np.ndarray, "E T 1"]]:
     """Fit to the readings with these signs, then with those of the fit, until they stay."""
+
+    def fit_to(y: np.ndarray) -> Estimate:
+        return fit_plain(plant, replace(records, y=y), smaller if plant.order > 2 else None)
+
+    readings = np.abs(records.y)
+    fit = fit_to(signs * readings)
     for _ in range(ROUNDS):
-        y = signs * np.abs(records.y)
-        fit = fit_plain(plant, replace(records, y=y), smaller if plant.order > 2 else None)
-        before, signs = signs, np.where(y - fit.errors < 0, -1.0, 1.0)
+        before, signs = signs, np.where(signs * readings - fit.errors < 0, -1.0, 1.0)
         if (signs == before).all():
             break
+        fit = fit_to(signs * readings)
     return fit, signs
 
 
@@ -50,7 +55,7 @@ def _of_inputs(records: Records) -> Iterator[Float[np.ndarray, "E T 1"]]:
     u = np.sum(records.u / records.input_sizes, axis=2, keepdims=True)
     for samples in np.geomspace(5.0, max(5.0, records.mask.shape[1] / 3), LAGS):
         kept = np.exp(-1 / samples)
-        yield np.where(lfilter([1 - kept], [1.0, -kept], u, axis=1) < 0, -1.0, 1.0)
+        yield np.where(np.asarray(lfilter([1 - kept], [1.0, -kept], u, axis=1)) < 0, -1.0, 1.0)
 
 
 def _rungs(plant: Plant) -> Iterator[Plant]:
