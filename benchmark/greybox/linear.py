@@ -12,7 +12,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors, errors_on, in_most
-from simgap.greybox.noise import Noise, log_likelihood, white, white_as_large_as
+from simgap.greybox.noise import Noise, log_likelihood, schwarz_order, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
@@ -24,7 +24,8 @@ from simgap.greybox.terms import Term
 from simgap.greybox.trial import score_gain
 from simgap.records import Channels, Experiment, Kind
 
-MAX_ORDER = 4
+MAX_ORDER = 8
+USUAL = 4  # beyond, an order must be likelier in training too, because so many poles fit any few held-out blocks
 # A higher order must lower the held-out error by this share, or it is not worth it.
 WORTH_AN_ORDER = 0.015
 # Log-likelihood ratio, for each input, that speaks for an input that does not stand still between samples.
@@ -128,6 +129,8 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
             grid = order <= 2 and not zeros
             fit = fit_plain(plant, train, None if grid else here[0][0] if zeros else smaller)
             here.append((fit, block_errors(fit, valid, n_init)))
+        if order > USUAL and not _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train):
+            break
         known = min((squares.mean() for _, squares in tried), default=np.inf)
         tried += here
         smaller = here[0][0]
@@ -145,6 +148,17 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
         if worse.mean() <= worse.std() / math.sqrt(len(worse)):
             break
     return chosen
+
+
+def _likelier(larger: Sequence[Estimate], smaller: Sequence[Estimate], train: Records) -> bool:
+    """Tell whether one of the larger models is likelier than all smaller ones at what it costs (Schwarz 1978)."""
+    order = max(schwarz_order(fit.errors, train.mask, train.resolution) for fit in (*larger, *smaller))
+
+    def score(fit: Estimate) -> float:
+        likely = log_likelihood(fit.errors, train.mask, order, train.resolution)
+        return likely - 0.5 * int(fit.plant.free.sum()) * math.log(train.samples)
+
+    return max(map(score, larger)) > max(map(score, smaller))
 
 
 def first_order_hold(held: Estimate, train: Records, valid: Records, n_init: int) -> Estimate | None:

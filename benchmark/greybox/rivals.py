@@ -11,7 +11,7 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.joint import on_joint, with_joint
 from simgap.greybox.leftover import look_for_more
-from simgap.greybox.linear import MAX_ORDER, first_order_hold, scaled
+from simgap.greybox.linear import first_order_hold, scaled
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.score_test import candidates
@@ -19,6 +19,7 @@ from simgap.greybox.selection import BETTER, Selection, select
 from simgap.greybox.trial import MATTERS, score_gain
 from simgap.records import Channels
 
+MAX_ORDER = 4  # with effects: every order is another search
 UNEXPLAINED = 0.05  # of the plain model's squared error: more that the input still predicts
 
 
