@@ -105,8 +105,9 @@ def extend(
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
         if term.effect.hides_sign and plant.ny == 1:
             plain = unfolded(baseline.plant, baseline.train)
-            theta = np.concatenate((plain.theta, thetas[0][plant.n_linear :]))
-            return min(fit, baseline.fit(plant.terms, [(theta, plain.local)], max_steps), key=lambda fit: fit.squares)
+            theta, local = plant.carry(plain.plant, plain.theta, plain.local)
+            theta[plant.n_linear :] = thetas[0][plant.n_linear :]
+            return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
         if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
             return fit
         # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).

@@ -171,15 +171,21 @@ def orders_tried(train, valid, kind):
     return [model.plant.order for model in models]
 
 
-def order_chosen(blocks_of):
-    """The order that is chosen for a kind `other` when the models of order n have the held-out blocks blocks_of[n]."""
+def order_chosen(blocks_of, trained=None):
+    """The order that is chosen for a kind `other` when the models of order n have the held-out blocks blocks_of[n].
+
+    Those of higher orders are as those of the last. `trained` is the size of the training errors of an order, else 1.
+    """
     nothing = records(np.zeros((1, 40)), np.zeros((1, 40, 1)), 1.0)
 
+    white = np.random.default_rng(0).standard_normal((1, 40, 1))
+
     def fitted(plant, *_):
-        return Estimate(plant, np.zeros(plant.size), np.zeros((1, 1)), np.zeros((1, 40, 1)), 1.0, True)
+        errors = (trained or {}).get(plant.order, 1.0) * white
+        return Estimate(plant, np.zeros(plant.size), np.zeros((1, 1)), errors, 1.0, True)
 
     def errors(fit, *_):
-        return np.asarray(blocks_of[fit.plant.order], dtype=float)
+        return np.asarray(blocks_of[min(fit.plant.order, max(blocks_of))], dtype=float)
 
     with patch.object(linear, "fit_plain", fitted), patch.object(linear, "block_errors", errors):
         return linear.plain_models(nothing, nothing, "other", 10)[-1].plant.order

@@ -38,6 +38,12 @@ def test_a_signal_of_no_known_kind_gets_the_order_of_the_plant_behind_it(plant, 
     assert order_of(plain_search(train, valid, "other")) == order
 
 
+def test_beyond_four_an_order_must_be_likelier_in_training_too():
+    held_out = {0: blocks(9.0), 1: blocks(8.0), 2: blocks(6.0), 3: blocks(4.0), 4: blocks(2.0), 5: blocks(1.0)}
+    assert order_chosen(held_out) == 4
+    assert order_chosen(held_out, trained={5: 0.1}) == 5
+
+
 def test_models_come_from_the_simplest_on_and_end_with_the_chosen_one():
     orders = orders_tried(*measured(third_order()), "other")
     assert orders[0] == 0 and orders == sorted(orders)
