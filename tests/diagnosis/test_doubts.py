@@ -38,6 +38,7 @@ def test_nothing_is_named_on_a_record_of_the_controller_and_the_first_sentence_s
     assert str(answer).startswith("loop: Nothing is named. op answers pv")
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_the_mean_is_the_better_model():
     rng = np.random.default_rng(0)
     made = []

@@ -49,6 +49,7 @@ def test_readings_without_a_sign_are_unfolded_by_the_signs_of_a_model(recorded):
     np.testing.assert_allclose(poles_of(fit), TRUE_POLES, rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["velocity", "other"])
 def test_order_and_a_sensor_without_a_sign_are_found_together(recorded, kind):
     u, y = recorded
