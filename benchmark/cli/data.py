@@ -49,7 +49,7 @@ def check(
     """Read a data set as `run` would, refuse it with a reason, or say what it holds."""
     from simgap.data import describe
 
-    described = describe(read_data(name, inputs, outputs, dt, kind, resample, split_gaps))
+    described = describe(read_data(name, inputs, outputs, dt, kind, resample, split_gaps).dataset)
     if json is not None:
         write_json(json, described)
     typer.echo(f"{described['name']}: usable, sampled every {described['sampling_time']:g} s")

@@ -17,7 +17,7 @@ from simgap.cli.options import (
     SamplingTime,
     SplitGaps,
     check_writable,
-    read_with_simulation,
+    read_data,
     write_json,
 )
 
@@ -45,13 +45,13 @@ def diagnose(
     from simgap.saved.archive import save_model
 
     check_writable(json, html, save)
-    dataset, theirs = read_with_simulation(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
-    answer = diagnose(dataset, seed=seed, profiles=html is not None, simulated=theirs)
+    reading = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
+    answer = diagnose(reading.dataset, seed=seed, profiles=html is not None, simulated=reading.simulated)
     if json is not None:
         write_json(json, answer.to_json())
     if html is not None:
         html.write_text(answer.to_html(), encoding="utf-8")
     typer.echo(str(answer))
     if save is not None:
-        save_model(answer.model, save, dataset)
+        save_model(answer.model, save, reading.dataset)
         typer.echo(f"Saved: {save}")

@@ -77,7 +77,7 @@ def export(
         records: Any = data
         if not exports.is_saved(model):
             exports.check_model(model, to)
-            records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps)
+            records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps).dataset
             params = parse_params(param or ())
         done = exports.export(model, records, to, out, params, seed, experiment, dt, known, into, joint)
     typer.echo(printable(str(done)))

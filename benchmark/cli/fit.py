@@ -65,7 +65,7 @@ def fit(
     console = Console()
     try:
         fitting.check_params(model, params)  # first, because data may take seconds to load
-        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known)
+        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
         with _progress(console):
             done = fitting.fit(model, dataset, params, seed)
     except (UnusableInput, KeyboardInterrupt, OSError):

@@ -13,7 +13,7 @@ import typer
 from simgap.records import UnusableInput
 
 if TYPE_CHECKING:
-    from simgap.records import Dataset
+    from simgap.data import Reading
 
 Inputs = Annotated[list[str] | None, typer.Option("--input", help="Input column of a CSV file; repeatable.")]
 Outputs = Annotated[list[str] | None, typer.Option("--output", help="Output column; repeatable.")]
@@ -74,23 +74,9 @@ def read_data(
     resample: float | None = None,
     split_gaps: bool = False,
     known: Sequence[str] | None = None,
-) -> Dataset:
-    """Load the data of a command and print in one line what was inferred, if anything was. Raises UnusableInput."""
-    return read_with_simulation(data, inputs, outputs, dt, kind, resample, split_gaps, known)[0]
-
-
-def read_with_simulation(
-    data: str,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
-    dt: float | None = None,
-    kind: Sequence[str] | None = None,
-    resample: float | None = None,
-    split_gaps: bool = False,
-    known: Sequence[str] | None = None,
     simulated: Sequence[str] | None = None,
-) -> tuple[Dataset, Dataset | None]:
-    """Load the data as `read_data` does, and the simulation that stands in other columns. Raises UnusableInput."""
+) -> Reading:
+    """Load the data of a command and print in one line what was inferred, if anything was. Raises UnusableInput."""
     from simgap.data import read
     from simgap.data.formats.plant_table import parse_known
 
@@ -99,7 +85,7 @@ def read_with_simulation(
     reading = read(data, *columns, dt, None, kinds, resample, split_gaps, machine, simulated or ())
     if str(reading):
         typer.echo(str(reading))
-    return reading.dataset, reading.simulated
+    return reading
 
 
 def check_writable(*files: Path | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,7 +26,6 @@ from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import Identified, channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
-from simgap.metrics import is_finite, relative, spread
 from simgap.records import Channels, Dataset
 
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
@@ -115,7 +113,7 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
     findings = Findings(
         dataset=dataset.name,
         verdict=verdict,
-        baseline=_baseline(plain, dataset, before),
+        baseline=_plain(plain, dataset, before),
         linear=_linear(identified, dataset),
         wrong=wrong(lambda _, x: gains.free_run(plain, x, dataset.n_init), dataset, seed) if views_too else (),
         causes=promised.causes if promised else (),
@@ -158,18 +156,9 @@ def _runner_up(evidence: Sequence[Evidence]) -> dict[str, Any] | None:
     return {"effect": best.effect.name, "title": best.effect.title, "gain": best.gain, "margin": best.behind}
 
 
-def _baseline(plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, Any]:
-    rmse, fit = {}, {}
-    y = np.concatenate([x.y[dataset.n_init :] for x in dataset.test])
-    y_hat = np.concatenate(before)
-    for i, channel in enumerate(dataset.channels.outputs):
-        grown = not is_finite(y_hat[:, i])
-        error = math.inf if grown else float(np.sqrt(np.mean((y[:, i] - y_hat[:, i]) ** 2)))
-        rmse[channel.name] = error
-        std = spread(y[:, i])
-        fit[channel.name] = relative(error, std)["fit_percent"] if std else math.nan
+def _plain(plain: GreyBoxModel, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, Any]:
     orders = plain.fitted["order"]
-    return {"order": orders[0] if len(orders) == 1 else orders, "rmse": rmse, "fit_percent": fit}
+    return {"order": orders[0] if len(orders) == 1 else orders, **gains.errors_by_output(dataset, before)}
 
 
 def _linear(identified: Sequence[Identified], dataset: Dataset) -> dict[str, Any] | None:
@@ -177,7 +166,7 @@ def _linear(identified: Sequence[Identified], dataset: Dataset) -> dict[str, Any
     if not any(one.linear for one in identified):
         return None
     model = GreyBoxModel([one.plant if one.linear else one.plain for one in identified])
-    return _baseline(model, dataset, [gains.free_run(model, x, dataset.n_init) for x in dataset.test])
+    return _plain(model, dataset, [gains.free_run(model, x, dataset.n_init) for x in dataset.test])
 
 
 def _left(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:

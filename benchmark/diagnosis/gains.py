@@ -13,6 +13,7 @@ from simgap.error_views.correlation import correlation_time, means
 from simgap.findings import Gain
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.samples import sizes_of
+from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset, Experiment
 
 # More blocks hardly narrow an interval; longer ones forgive a memory that was taken for too short (Schmeiser 1982).
@@ -40,10 +41,10 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     n = dataset.n_init
     y = np.concatenate([x.y[n:] for x in dataset.test])  # [N, ny]
     known = np.concatenate([x.y for x in dataset.training.train])
-    spread = np.where(y.any(axis=0), sizes_of(y), sizes_of(known))
-    squares = [_bounded((y - np.concatenate(y_hat)) / spread) ** 2 for y_hat in (before, after)]
-    rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of the spread
-    rmse = [np.where(error < GROWN, error * spread, np.inf) for error in rmse]
+    scale = np.where(y.any(axis=0), sizes_of(y), sizes_of(known))
+    squares = [_bounded((y - np.concatenate(y_hat)) / scale) ** 2 for y_hat in (before, after)]
+    rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of scale
+    rmse = [np.where(error < GROWN, error * scale, np.inf) for error in rmse]
     loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
     experiment = np.repeat(np.arange(len(dataset.test)), [len(x.y[n:]) for x in dataset.test])
     shares = share_with_interval(loss_before, loss_after, experiment)
@@ -51,6 +52,19 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
     return Gain(rmse_before, rmse_after, share, low, high)
+
+
+def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[str, dict[str, float]]:
+    """Compute RMSE and fit percent of a simulation of the test experiments, by output; infinite where it grew."""
+    y, y_hat = np.concatenate([x.y[dataset.n_init :] for x in dataset.test]), np.concatenate(simulated)
+    rmse, fit = {}, {}
+    for i, channel in enumerate(dataset.channels.outputs):
+        error = math.inf
+        if is_finite(y_hat[:, i]):
+            error = float(np.sqrt(np.mean((y[:, i] - y_hat[:, i]) ** 2)))
+        rmse[channel.name], std = error, spread(y[:, i])
+        fit[channel.name] = relative(error, std)["fit_percent"] if std else math.nan
+    return {"rmse": rmse, "fit_percent": fit}
 
 
 def share_with_interval(
@@ -69,8 +83,8 @@ def share_with_interval(
     sum(w)^2 / sum(w^2) - 1 degrees of freedom with the blocks' shares w of the losses, because an error that sits in
     two of ten blocks is seen twice (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
     """
-    relative = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
-    d = relative[1] - relative[0]
+    losses = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
+    d = losses[1] - losses[0]
     lengths = np.bincount(experiment)
     lengths = lengths[lengths > 0]
     tau, _ = correlation_time(d - means(d, experiment), lengths, len(lengths))
@@ -80,7 +94,7 @@ def share_with_interval(
     variance = m / max(1, m - 1) * np.sum(np.add.reduceat(d, starts) ** 2) / len(d) ** 2
     correction = 1 - min(0.5, 0.5 * tau / mean_length) if m > len(lengths) else 1.0
     variance /= correction
-    w = np.add.reduceat(relative.mean(axis=0), starts)
+    w = np.add.reduceat(losses.mean(axis=0), starts)
     freedom = max(1.0, w.sum() ** 2 / np.sum(w**2) - 1)
     reach = student.ppf(0.975, freedom) * math.sqrt(variance) if m > 1 else math.inf
     ratio = math.log(after.mean() / before.mean())

@@ -18,7 +18,6 @@ from simgap.greybox.linear_names import linear_names
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.samples import sizes_of
 from simgap.greybox.terms import Term
-from simgap.metrics import relative, spread
 from simgap.records import Channels, Dataset
 from simgap.their_simulation import LinearNumber, TheirSimulation
 
@@ -51,7 +50,7 @@ def judge(answer: Diagnosis, dataset: Dataset, simulated: Dataset, seed: int, vi
     findings = replace(
         found,
         verdict=verdict,
-        baseline=_errors_as_baseline(found, dataset, before),
+        baseline={"order": found.baseline["order"], **gains.errors_by_output(dataset, before)},
         linear=None,
         wrong=wrong(lambda i, x: runs[i][: len(x) - n], dataset, seed) if views_too else (),
         causes=causes if verdict == "named" else (),
@@ -164,18 +163,6 @@ def linear_numbers(side: SideBySide, dataset: Dataset) -> tuple[LinearNumber, ..
         for (name, unit), parameter, value, low, high, theirs in rows
         if not parameter.fixed
     )
-
-
-def _errors_as_baseline(found: Findings, dataset: Dataset, before: Sequence[np.ndarray]) -> dict[str, object]:
-    y, y_hat = np.concatenate([x.y[dataset.n_init :] for x in dataset.test]), np.concatenate(before)
-    rmse = np.sqrt(np.mean((y - y_hat) ** 2, axis=0))
-    fit = {}
-    for i, channel in enumerate(dataset.channels.outputs):
-        std = spread(y[:, i])
-        fit[channel.name] = relative(float(rmse[i]), std)["fit_percent"] if std else float("nan")
-    names = [channel.name for channel in dataset.channels.outputs]
-    return {"order": found.baseline["order"], "rmse": dict(zip(names, map(float, rmse), strict=True)),
-            "fit_percent": fit}  # fmt: skip
 
 
 def _budgets(

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from simgap.data.simulated.rigs import CATALOGUE, OUTSIDE, RIGS, hide, physical, suitable
-from simgap.data.simulated.rigs.kernels import Drive, arriving
+from simgap.data.simulated.rigs.drive_kernels import Drive, arriving
 
 EVERY = [(rig, effect) for rig in RIGS for effect in (*suitable(rig), *suitable(rig, outside=True))]
 

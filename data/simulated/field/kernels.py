@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from simgap.data.simulated.rigs.kernels import sticking
+from simgap.data.simulated.rigs.drive_kernels import sticking
 
 HELD = 2.0  # instead of a side of dry friction
 

@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.random import Generator
 
-from simgap.data.simulated.rigs.kernels import Body, Drive, Tanks, fill, move
+from simgap.data.simulated.rigs.drive_kernels import Drive
+from simgap.data.simulated.rigs.kernels import Body, Tanks, fill, move
 from simgap.data.simulated.rigs.plants import Rig
 
 SLIP = 0.6  # of a sticking valve: the jump as a share of the band
