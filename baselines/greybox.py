@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from simgap.greybox.additions import add, from_other_poles
 from simgap.greybox.effects.effect import Effect, InputEffect
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.position_and_velocity import plants_of
-from simgap.greybox.score_test import add, from_other_poles
 from simgap.greybox.terms import Term
 from simgap.records import Channel, TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,10 +56,10 @@ class Baseline:
         """White noise as large as the errors of the plain model; it weighs the outputs against each other."""
         return white_as_large_as(self.estimate.errors, self.train.mask, self.train.resolution)
 
-    @cached_property
+    @property
     def squares(self) -> float:
         """Squared errors of the plain model, weighted as those of all other models."""
-        return self.squares_of(self.estimate)
+        return self.estimate.squares
 
     @cached_property
     def squares_of_mean(self) -> float:
@@ -78,10 +78,6 @@ class Baseline:
         """Set up the fit of a plant to the training records."""
         return Problem(plant, self.train, self.noise)
 
-    def squares_of(self, estimate: Estimate) -> float:
-        """Sum the squared training errors of any model, weighted by the noise of this one."""
-        return self.problem(estimate.plant).squares(estimate.errors)
-
     def in_pieces(self, plant: Plant) -> Problem:
         """Set up the fit of a plant to short pieces of the training records, each from a start of its own."""
         return Problem(plant, self.train.pieces(min(PIECE, self.train.mask.shape[1])), self.noise)
@@ -95,3 +91,9 @@ class Baseline:
             (descend(problem, *start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
             key=lambda fit: fit.squares,
         )
+
+
+def weighed(fit: Estimate, records: Records) -> Estimate:
+    """Count the squares of a plain model in units of its errors' own size, as those of all models with effects are."""
+    noise = white_as_large_as(fit.errors, records.mask, records.resolution)
+    return replace(fit, squares=Problem(fit.plant, records, noise).squares(fit.errors))

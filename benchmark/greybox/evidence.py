@@ -172,9 +172,9 @@ class Evidence:
         """What could stand in the place of an effect, the nearest first; the other effects stay."""
         rivals: list[Rival] = []
         # A known machine has many runs, and only what the search came by is compared.
-        if self.selection.baseline.plant.machine is not None and not self.selection.has_compared(without):
+        if self.selection.baseline.plant.machine is not None and not self.selection.has_extended(without):
             return rivals
-        for trial in self.selection.compare(without):
+        for trial in self.selection.extend(without):
             new = [t for t in trial.terms if t not in without.terms]
             other = bool(new) and not new[0].replaces(term) and new[0].effect.name != term.effect.name
             if other and significant(self.selection.baseline, without, trial):

@@ -80,7 +80,7 @@ def _selected(data: TrainingSet, channels: Channels, outputs: tuple[int, ...], s
     whole = data.train, data.valid, channels, outputs, data.n_init
     if channels.plant is not None:
         return select(find_machine_baseline(*whole))
-    selection = select(settled.baseline, settled.compared) if settled else select(find_baseline(*whole))
+    selection = select(settled.baseline, settled.extended) if settled else select(find_baseline(*whole))
     baseline, chosen = selection.baseline, selection.trial.estimate
     if baseline.outliers and chosen.plant.terms:
         records = Records.of(excerpts(data.train), outputs)

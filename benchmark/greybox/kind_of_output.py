@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
+from simgap.greybox.additions import Extended, extend, with_one_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.noise import schwarz_order
 from simgap.greybox.position_and_velocity import with_kind
-from simgap.greybox.score_test import candidates, extend
-from simgap.greybox.selection import Compared, compare
+from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import MATTERS, Trial, assess, holds_out, ranked, significant
 from simgap.records import Channels, Kind, TrainingSet
@@ -33,7 +33,7 @@ class Hypothesis:
     kind: Kind
     baseline: Baseline
     larger: tuple[Estimate, ...] = ()
-    compared: Compared | None = None  # what a selection need not fit again
+    extended: Extended | None = None  # what a selection need not fit again
 
     def judged(self, judge: Baseline, noise_order: int) -> Standing:
         """Find its best model: the plain one, or one with an effect that noise would not do as well as."""
@@ -82,7 +82,7 @@ class Settled:
 
     kind: Kind
     baseline: Baseline
-    compared: Compared
+    extended: Extended
     rivals: tuple[tuple[Kind, Effect], ...] = ()
     as_well: tuple[Kind, ...] = ()  # kinds that do as well and lead to the same
 
@@ -101,7 +101,7 @@ def settle(data: TrainingSet, channels: Channels, output: int) -> Settled:
     chosen = min(unclaimed or plain or left, key=lambda s: (s.trial.cost, -s.trial.score))
     one = chosen.hypothesis
     same: list[Kind] = [s.hypothesis.kind for s in left if s is not chosen and _same(s.lead, chosen.lead)]
-    return Settled(one.kind, one.baseline, one.compared or {}, _rivals(chosen, left), tuple(same))
+    return Settled(one.kind, one.baseline, one.extended or {}, _rivals(chosen, left), tuple(same))
 
 
 def _same(one: Effect | None, other: Effect | None) -> bool:
@@ -171,9 +171,9 @@ class _Hypotheses:
 
 
 def _extended(plain: Hypothesis) -> Hypothesis:
-    compared: Compared = {}
-    trials = compare(plain.baseline, plain.baseline.estimate, 0, compared)
-    return replace(plain, larger=tuple(trial.estimate for trial in trials), compared=compared)
+    extended: Extended = {}
+    larger = with_one_more(plain.baseline, plain.baseline.estimate, extended)
+    return replace(plain, larger=larger, extended=extended)
 
 
 def _if_tank(level: Hypothesis) -> list[Hypothesis]:

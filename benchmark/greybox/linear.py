@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from simgap.greybox.baseline import Baseline
+from simgap.greybox.additions import add
+from simgap.greybox.baseline import Baseline, weighed
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors, errors_on, in_most
@@ -18,7 +19,7 @@ from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
-from simgap.greybox.score_test import add, candidates
+from simgap.greybox.score_test import candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import score_gain
@@ -86,10 +87,11 @@ def _does_as_well(other: Estimate, baseline: Baseline, to_beat: np.ndarray) -> b
 
 
 def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
-    """Measure the scales of the signals that effects choose bounds by."""
+    """Measure the scales of the signals that effects choose bounds by, and weigh the errors as those of all models."""
     moved = _under_load(plain, records)
     problem = Problem(moved.plant, records, white(records.sizes))
-    return replace(plain, plant=replace(plain.plant, scales=scales_of(moved, problem, channels, outputs)))
+    plant = replace(plain.plant, scales=scales_of(moved, problem, channels, outputs))
+    return weighed(replace(plain, plant=plant), records)
 
 
 def _under_load(plain: Estimate, records: Records) -> Estimate:

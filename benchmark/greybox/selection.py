@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.baseline import MAX_STEPS, Baseline
+from simgap.greybox.additions import Extended, extend, key_of, with_one_more
+from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.noise import log_likelihood, schwarz_order
-from simgap.greybox.score_test import WORTH_A_REFIT, candidates, extend, from_other_poles, jacobian_of, promising
+from simgap.greybox.noise import log_likelihood
+from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
-from simgap.greybox.trial import Trial, assess, holds_out, ranked, significant
+from simgap.greybox.trial import Trial, assess, assessed, holds_out, judged, ranked, significant
 
 # Log-likelihood ratio that confirms what the readings show already.
 CONFIRMED = 8.0
 # By how much the score of another choice of effects must be better to be preferred to the first one.
 BETTER = 1.0
-# Steps of a fit until the candidates of a round are compared; the finalists are then fitted to the end.
-FEW_STEPS = 6
-FINALISTS = 8
-PROMISING = 8  # effects of a known machine that are fitted at all
-FINALISTS_OF_MACHINE = 3
-MORE_STEPS = 8  # until they are compared again
-
-Compared = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Trial, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +37,7 @@ class Selection:
     trial: Trial
     noise_order: int
     rounds: tuple[Round, ...]
-    compared: Compared
+    extended: Extended
     parts: dict[frozenset[tuple[str, int]], Trial] = field(default_factory=dict)  # with some of the chosen effects only
 
     @classmethod
@@ -70,21 +62,22 @@ class Selection:
         """Fit the chosen model again with one term less."""
         return self.only([other for other in self.trial.terms if other != term])
 
-    def has_compared(self, trial: Trial) -> bool:
+    def has_extended(self, trial: Trial) -> bool:
         """Tell whether a model with each candidate added was fitted already."""
-        return (frozenset(term.key for term in trial.terms), False) in self.compared
+        return key_of(trial.terms) in self.extended
 
-    def compare(self, trial: Trial) -> list[Trial]:
-        """Fit and assess a model with each candidate added; what the selection has compared is not fitted again."""
-        return compare(self.baseline, trial.estimate, self.noise_order, dict(self.compared))
+    def extend(self, trial: Trial) -> list[Trial]:
+        """Fit and assess a model with each candidate added; what the selection has fitted is not fitted again."""
+        fits = with_one_more(self.baseline, trial.estimate, dict(self.extended))
+        return assessed(self.baseline, fits, self.noise_order)
 
 
-def select(baseline: Baseline, compared: Compared | None = None) -> Selection:
+def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     """Choose effects: what the readings show, what a linear model lacks, then all; superfluous ones are taken out.
 
-    What was `compared` before on this baseline is not fitted again.
+    What was `extended` before on this baseline is not fitted again.
     """
-    search = _Search(baseline, compared=dict(compared or {}))
+    search = _Search(baseline, extended=dict(extended or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
     if baseline.plant.machine is None:
         trial = search.forward(trial, linear_only=True)
@@ -92,7 +85,7 @@ def select(baseline: Baseline, compared: Compared | None = None) -> Selection:
     trial = search.backward(trial)
     if baseline.plant.machine is None:  # the order of a known machine is no guess that an early choice rests on
         trial = search.exchange(trial)
-    return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.compared)
+    return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended)
 
 
 @dataclass
@@ -102,7 +95,7 @@ class _Search:
     baseline: Baseline
     noise_order: int = 0
     rounds: list[Round] = field(default_factory=list)
-    compared: Compared = field(default_factory=dict)
+    extended: Extended = field(default_factory=dict)
 
     def visible(self, trial: Trial) -> Trial:
         """Add what the readings themselves show, before the errors of any model are asked."""
@@ -118,13 +111,9 @@ class _Search:
     def forward(self, trial: Trial, linear_only: bool = False) -> Trial:
         """Add the best effect, one after the other, while noise alone would not do as well."""
         while len(trial.terms) < self.baseline.plant.most_terms:
-            trials = compare(self.baseline, trial.estimate, self.noise_order, self.compared, linear_only)
-            if trials and self.baseline.plant.machine is None:  # whose many free runs judge, not the next sample
-                best = min(trials, key=lambda trial: trial.estimate.squares).estimate
-                self.noise_order = schwarz_order(best.errors, self.baseline.train.mask, self.baseline.resolution)
-                trial = self._assess(trial.estimate)
-                trials = ranked([self._assess(other.estimate) for other in trials])
-            self.rounds.append(Round(trial, tuple(trials)))
+            fits = with_one_more(self.baseline, trial.estimate, self.extended, linear_only)
+            self.noise_order, trial, trials = judged(self.baseline, trial, fits, self.noise_order)
+            self.rounds.append(Round(trial, trials))
             better = ranked([other for other in trials if significant(self.baseline, trial, other)])
             if not better:
                 break
@@ -154,7 +143,8 @@ class _Search:
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
             rest = self._without(trial, term)
-            trials = compare(self.baseline, rest.estimate, self.noise_order, self.compared)
+            fits = with_one_more(self.baseline, rest.estimate, self.extended)
+            trials = assessed(self.baseline, fits, self.noise_order)
             trials = ranked([other for other in trials if significant(self.baseline, rest, other)])
             if trials and trials[0].score > trial.score + BETTER:
                 trial = self.backward(trials[0])
@@ -191,77 +181,3 @@ def only(baseline: Baseline, trial: Trial, noise_order: int, terms: Sequence[Ter
     plain, of_plain = plant.carry(baseline.plant, baseline.estimate.theta, baseline.estimate.local)
     plain[plant.n_linear :] = theta[plant.n_linear :]
     return assess(baseline, baseline.fit(plant.terms, [(theta, local), (plain, of_plain)]), noise_order)
-
-
-def compare(
-    baseline: Baseline, estimate: Estimate, noise_order: int, compared: Compared, linear_only: bool = False
-) -> list[Trial]:
-    """Add every candidate (or the linear ones) to a model, refit and assess it; the best first.
-
-    `compared` holds the candidates of the models that were asked for before; they are assessed anew, not fitted.
-    """
-    terms = estimate.plant.terms
-    key = (frozenset(term.key for term in terms), linear_only)
-    if key in compared:
-        return ranked([assess(baseline, trial.estimate, noise_order) for trial in compared[key]])
-    jacobian = jacobian_of(baseline, estimate)
-    before = baseline.squares_of(estimate)
-
-    def worth(fit: Estimate) -> bool:
-        gained = 0.5 * baseline.n_errors * math.log(before / fit.squares)
-        return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
-
-    tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
-    finalists = FINALISTS
-    if baseline.plant.machine is not None:
-        tried, finalists = promising(baseline, estimate, tried, jacobian, PROMISING), FINALISTS_OF_MACHINE
-    begin = partial(extend, baseline, estimate, jacobian=jacobian, max_steps=FEW_STEPS)
-    begun = [fit for fit in on_cores(begin, tried) if fit is not None]
-    begun.sort(key=lambda fit: _cost(baseline, fit))
-    finalists = _anew(baseline, estimate, _race(baseline, begun[:finalists], worth))
-    compared[key] = tuple(on_cores(partial(assess, baseline, noise_order=noise_order), finalists))
-    return ranked(list(compared[key]))
-
-
-def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:
-    """Go on with fits until all have converged but those that are behind the best by more than their last gain."""
-    fits, gains = list(fits), [math.inf] * len(fits)
-    for _ in range(MAX_STEPS // MORE_STEPS):
-        costs = [_cost(baseline, fit) for fit in fits]
-        running = [
-            i for i, fit in enumerate(fits)
-            if not fit.converged and worth(fit) and costs[i] - min(costs) <= gains[i]
-        ]  # fmt: skip
-        for i, fit in zip(running, on_cores(partial(_go_on, baseline), [fits[i] for i in running]), strict=True):
-            fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
-    return fits
-
-
-def _go_on(baseline: Baseline, fit: Estimate) -> Estimate:
-    return baseline.fit(fit.plant.terms, [(fit.theta, fit.local)], MORE_STEPS)
-
-
-def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Estimate]:
-    """Fit the best effect from other poles too, and its special cases from its plant."""
-    if not fits:
-        return fits
-    best = min(fits, key=lambda fit: _cost(baseline, fit))
-    others = [fit for fit in fits if fit is not best]
-    best = from_other_poles(baseline, before, best)
-    return [best, *on_cores(partial(_from_best, baseline, best), others)]
-
-
-def _from_best(baseline: Baseline, best: Estimate, fit: Estimate) -> Estimate:
-    plant, term = fit.plant, fit.plant.terms[-1]
-    if term.effect.name not in best.plant.terms[-1].effect.contains:
-        return fit
-    theta, local = plant.carry(best.plant, best.theta, best.local)
-    theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
-    return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
-
-
-def _cost(baseline: Baseline, fit: Estimate) -> float:
-    """Weigh squares against the number of parameters, for candidates of one round."""
-    n = baseline.n_errors
-    parameters = int(fit.plant.free.sum()) + len(fit.local) * len(fit.plant.per_experiment)
-    return 0.5 * n * math.log(fit.squares) + 0.5 * parameters * math.log(n)

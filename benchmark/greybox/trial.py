@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.stats import chi2
 
+from simgap.cores import on_cores
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
@@ -78,6 +81,25 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         len(valid.u) * len(plant.per_experiment),
         np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
     )  # fmt: skip
+
+
+def judged(
+    baseline: Baseline, before: Trial, fits: Sequence[Estimate], noise_order: int
+) -> tuple[int, Trial, tuple[Trial, ...]]:
+    """Assess models with one effect more, the best first, and the one before them, under the noise of the best.
+
+    A known machine keeps the noise order: its many free runs judge, not the next sample.
+    """
+    if fits and baseline.plant.machine is None:
+        best = min(fits, key=lambda fit: fit.squares)
+        noise_order = schwarz_order(best.errors, baseline.train.mask, baseline.resolution)
+        before = assess(baseline, before.estimate, noise_order)
+    return noise_order, before, tuple(assessed(baseline, fits, noise_order))
+
+
+def assessed(baseline: Baseline, fits: Sequence[Estimate], noise_order: int) -> list[Trial]:
+    """Assess several models, the best first."""
+    return ranked(on_cores(partial(assess, baseline, noise_order=noise_order), fits))
 
 
 def score_gain(one: Baseline, estimate: Estimate, other: Baseline, without: Estimate) -> float:

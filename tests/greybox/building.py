@@ -12,16 +12,17 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
+from simgap.greybox.additions import add, with_one_more
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.samples import Records
-from simgap.greybox.score_test import add, jacobian_of, score
 from simgap.greybox.score_test import candidates as _candidates
-from simgap.greybox.selection import Selection, _Search, compare, passes
-from simgap.greybox.trial import Trial, assess
+from simgap.greybox.score_test import score_tests
+from simgap.greybox.selection import Selection, _Search, passes
+from simgap.greybox.trial import Trial, assess, assessed
 from simgap.greybox.trial import ranked as _ranked
 from simgap.greybox.trial import significant as _significant
 
@@ -49,7 +50,7 @@ def scores_of(search, name):
     """The score test of every start of an effect: gain of log-likelihood, and the values that it moves to."""
     plain, added = search.estimate, term(name)
     plant = search.plant.having([added])
-    scored = score(search, plain, plant, added, jacobian_of(search, plain))
+    scored = score_tests(search, plain, [added])[0]
     return [(gain, tuple(theta[plant.part_of(added)])) for gain, theta, _ in scored]
 
 
@@ -80,7 +81,8 @@ def with_effects(search, *names):
 
 def best_of_round(search):
     """The plain model and the best of all its extensions by one effect."""
-    return assess(search, search.estimate, 0), compare(search, search.estimate, 0, {})[0]
+    fits = with_one_more(search, search.estimate, {})
+    return assess(search, search.estimate, 0), assessed(search, fits, 0)[0]
 
 
 def names_of(trial):

@@ -8,9 +8,9 @@ import pytest
 from simgap.data.formats.plant_table import read_plant
 from simgap.data.simulated.rigs import hide, physical
 from simgap.diagnosis.diagnose import diagnose
+from simgap.greybox.additions import extend
 from simgap.greybox.machine import INERTIA, NAMES
 from simgap.greybox.machine_baseline import find_machine_baseline
-from simgap.greybox.score_test import extend
 from simgap.greybox.terms import Term
 from simgap.records import Channel, Channels, Experiment
 from simgap.registry import EFFECTS, MODELS

@@ -1,0 +1,196 @@
+"""Models with one effect more: begun where it promises most, compared while they are fitted, the best from afresh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from simgap.cores import on_cores
+from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
+from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.machine import DAMPING
+from simgap.greybox.plant import Plant
+from simgap.greybox.pole_search import refit_from_poles
+from simgap.greybox.score_test import STARTS, Scored, candidates, score_tests, with_term
+from simgap.greybox.terms import Term
+from simgap.greybox.unfolding import unfolded
+
+# Score tests below this log-likelihood ratio are not worth a refit.
+WORTH_A_REFIT = 2.0
+FIRST_STEPS = 8  # of a fit from each of many starts
+STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
+# Steps of a fit until the candidates are compared; the finalists are then fitted to the end.
+FEW_STEPS = 6
+FINALISTS = 8
+PROMISING = 8  # effects of a known machine that are fitted at all
+FINALISTS_OF_MACHINE = 3
+MORE_STEPS = 8  # until they are compared again
+
+# The models with one effect more than those of the key, and whether only linear effects were asked for.
+Extended = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Estimate, ...]]
+
+
+def with_one_more(
+    baseline: Baseline, estimate: Estimate, extended: Extended, linear_only: bool = False
+) -> tuple[Estimate, ...]:
+    """Fit a model with each candidate added (or each linear one), those to the end that may still be the best.
+
+    What is in `extended` is not fitted again.
+    """
+    terms = estimate.plant.terms
+    key = key_of(terms, linear_only)
+    if key in extended:
+        return extended[key]
+
+    def worth(fit: Estimate) -> bool:
+        gained = 0.5 * baseline.n_errors * math.log(estimate.squares / fit.squares)
+        return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
+
+    tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
+    scored, finalists = list(zip(tried, score_tests(baseline, estimate, tried), strict=True)), FINALISTS
+    if baseline.plant.machine is not None:  # which needs no other poles for any of them
+        scored.sort(key=lambda one: -max((gain for gain, *_ in one[1]), default=0.0))
+        scored, finalists = scored[:PROMISING], FINALISTS_OF_MACHINE
+    begun = [fit for fit in on_cores(partial(_begin, baseline, estimate), scored) if fit is not None]
+    begun.sort(key=lambda fit: _cost(baseline, fit))
+    extended[key] = tuple(_anew(baseline, estimate, _race(baseline, begun[:finalists], worth)))
+    return extended[key]
+
+
+def _begin(baseline: Baseline, estimate: Estimate, tested: tuple[Term, Sequence[Scored]]) -> Estimate | None:
+    return extend(baseline, estimate, *tested, max_steps=FEW_STEPS)
+
+
+def key_of(terms: Sequence[Term], linear_only: bool = False) -> tuple[frozenset[tuple[str, int]], bool]:
+    """Return what a set of effects is remembered by."""
+    return frozenset(term.key for term in terms), linear_only
+
+
+def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:
+    """Go on with fits until all have converged but those that are behind the best by more than their last gain."""
+    fits, gains = list(fits), [math.inf] * len(fits)
+    for _ in range(MAX_STEPS // MORE_STEPS):
+        costs = [_cost(baseline, fit) for fit in fits]
+        running = [
+            i for i, fit in enumerate(fits)
+            if not fit.converged and worth(fit) and costs[i] - min(costs) <= gains[i]
+        ]  # fmt: skip
+        for i, fit in zip(running, on_cores(partial(_go_on, baseline), [fits[i] for i in running]), strict=True):
+            fits[i], gains[i] = fit, costs[i] - _cost(baseline, fit)
+    return fits
+
+
+def _go_on(baseline: Baseline, fit: Estimate) -> Estimate:
+    return baseline.fit(fit.plant.terms, [(fit.theta, fit.local)], MORE_STEPS)
+
+
+def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Estimate]:
+    """Fit the best effect from other poles too, and its special cases from its plant."""
+    if not fits:
+        return fits
+    best = min(fits, key=lambda fit: _cost(baseline, fit))
+    others = [fit for fit in fits if fit is not best]
+    best = from_other_poles(baseline, before, best)
+    return [best, *on_cores(partial(_from_best, baseline, best), others)]
+
+
+def _from_best(baseline: Baseline, best: Estimate, fit: Estimate) -> Estimate:
+    plant, term = fit.plant, fit.plant.terms[-1]
+    if term.effect.name not in best.plant.terms[-1].effect.contains:
+        return fit
+    theta, local = plant.carry(best.plant, best.theta, best.local)
+    theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
+    return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
+
+
+def _cost(baseline: Baseline, fit: Estimate) -> float:
+    """Weigh squares against the number of parameters, for candidates of one round."""
+    n = baseline.n_errors
+    parameters = int(fit.plant.free.sum()) + len(fit.local) * len(fit.plant.per_experiment)
+    return 0.5 * n * math.log(fit.squares) + 0.5 * parameters * math.log(n)
+
+
+def extend(
+    baseline: Baseline,
+    estimate: Estimate,
+    term: Term,
+    scored: Sequence[Scored] | None = None,
+    max_steps: int = MAX_STEPS,
+) -> Estimate | None:
+    """Fit the model with one effect more, from the starts with the best scores; None if none is worth it.
+
+    The effect is tested here where it has not been `scored`.
+    """
+    plant = with_term(estimate.plant, term)
+    if term in plant.per_experiment:
+        return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
+    if term.effect.moves_poles and plant.machine is None:
+        thetas = [theta for theta, _ in started(estimate, plant, term)]
+        fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+        if term.effect.hides_sign and plant.ny == 1:
+            plain = unfolded(baseline.plant, baseline.train)
+            theta, local = plant.carry(plain.plant, plain.theta, plain.local)
+            theta[plant.n_linear :] = thetas[0][plant.n_linear :]
+            return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
+        if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
+            return fit
+        # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
+        of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)
+        return min(fit, baseline.fit(plant.terms, [(of_pieces.theta, None)], max_steps), key=lambda fit: fit.squares)
+    scored = score_tests(baseline, estimate, [term])[0] if scored is None else scored
+    if not scored or scored[0][0] < WORTH_A_REFIT:
+        return None
+    begun = [(theta, local) for _, theta, local in scored[:STARTS]]
+    if plant.machine is not None and term.effect.role == "friction":
+        # The damping stood in for it, and no descent leads from much of the one to much of the other.
+        begun = begun[:1] + _without_damping(baseline, estimate, plant, term)
+    return baseline.fit(plant.terms, begun, max_steps)
+
+
+def _without_damping(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Begin a friction from each of its starts with little damping that stays as it is; return the best ones."""
+    assert plant.machine is not None
+    problem, damping = baseline.problem(plant), np.arange(plant.size) == DAMPING
+    fits = [
+        descend(problem, plant.machine.less_damped(theta), local, damping, FIRST_STEPS, TOLERANCE)
+        for theta, local in started(estimate, plant, term)
+    ]
+    fits.sort(key=lambda fit: fit.squares)
+    return [(fit.theta, fit.local) for fit in fits[:STARTS]]
+
+
+def from_other_poles(baseline: Baseline, before: Estimate, fit: Estimate) -> Estimate:
+    """Fit a model from other poles too where its last effect takes most of the squared error that was there before.
+
+    The poles that the model had then stood in for the effect, and no descent may lead away from them.
+    """
+    if fit.squares > STOOD_IN * before.squares or fit.plant.joint:
+        return fit
+    afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
+    return min(fit, afresh, key=lambda fit: fit.squares)
+
+
+def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
+    """Fit the model with one effect more, whatever the score test says of it; none where it has nowhere to begin."""
+    if not baseline.plant.starts_of(term):
+        return estimate
+    extended = extend(baseline, estimate, term)
+    if extended is not None:
+        return extended
+    plant = baseline.plant.having([*estimate.plant.terms, term])
+    return baseline.fit(plant.terms, started(estimate, plant, term))
+
+
+def started(estimate: Estimate, plant: Plant, term: Term) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Carry a fitted model over into a larger one, with the new term at each of its starts."""
+    starts = []
+    for start in plant.starts_of(term):
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        theta[plant.part_of(term)] = start.values
+        starts.append((theta, local))
+    return starts
