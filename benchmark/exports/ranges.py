@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import norm
 
 from simgap.exports.grey_boxes import GreyBoxStep
 from simgap.exports.subjects import Subject
@@ -121,7 +122,8 @@ def spread(subject: Subject, numbers: Callable[[Subject], Mapping[str, float]]) 
         for name, number in made.items():
             if name in found:
                 found[name].append(number)
-    reach = {name: 2.33 * float(np.std(values)) for name, values in found.items() if values}
+    beyond = float(norm.ppf(0.5 + LEVEL / 2))
+    reach = {name: beyond * float(np.std(values)) for name, values in found.items() if values}
     return {
         name: (value[name] - r if value[name] - r > 0 or value[name] <= 0 else 0.0, value[name] + r)
         for name, r in reach.items() if r > FEW * abs(value[name])

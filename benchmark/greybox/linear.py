@@ -123,19 +123,23 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
             fit_plain(Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2), train)
         ]
     tried: list[tuple[Estimate, np.ndarray]] = []
-    smaller, rounds_in_vain = None, 0
+    smaller: dict[bool, Estimate] = {}  # of one order less, without and with zeros
+    rounds_in_vain = 0
     for order in range(kind == "level", MAX_ORDER + 1):
-        here = []
+        of_order: dict[bool, Estimate] = {}
         for zeros in {0: (0, 1), 1: (0,)}.get(order, (0,) if kind == "level" else (0, order - 1)):
             plant = Plant(kind, order, nu, dt, zeros=zeros, offset=True)
-            grid = order <= 2 and not zeros
-            fit = fit_plain(plant, train, None if grid else here[0][0] if zeros else smaller)
-            here.append((fit, block_errors(fit, valid, n_init)))
+            before = of_order.get(False) if zeros else smaller.get(False) if order > 2 else None
+            fits = [fit_plain(plant, train, before)]
+            if zeros and order > 2:  # a slow pole beside its zero is found in no model without zeros
+                fits.append(fit_plain(plant, train, smaller[True]))
+            of_order[zeros > 0] = min(fits, key=lambda fit: float(np.sum(fit.errors**2)))
+        here = [(fit, block_errors(fit, valid, n_init)) for fit in of_order.values()]
         if order > USUAL and not _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train):
             break
         known = min((squares.mean() for _, squares in tried), default=np.inf)
         tried += here
-        smaller = here[0][0]
+        smaller = of_order
         # A resonance takes two orders.
         rounds_in_vain = (
             rounds_in_vain + 1 if min(squares.mean() for _, squares in here) > (1 - WORTH_AN_ORDER) * known else 0

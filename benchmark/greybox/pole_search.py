@@ -16,6 +16,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 FINALISTS = 2
+STEPS_WITH_ZEROS = 6  # from given poles
 FEW_STEPS = 10  # of a fit with effects until the finalists are compared
 LARGEST_RATIO = 1e6
 
@@ -33,9 +34,12 @@ def fit_plain(
     """
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
     begun = []
-    # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it.
+    # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it. Zeros that are known of
+    # a smaller model move along.
+    moved = bool(plant.zeros and smaller is not None and smaller.plant.zeros)
     linear = np.zeros(plant.size, dtype=bool)
     linear[plant.layout.gains] = linear[plant.layout.offset] = True
+    linear[plant.layout.zeros] = moved
     if shapes is None:
         shapes = list(
             denominator_grid(plant, records) if smaller is None else larger_denominators(plant, records, smaller)
@@ -45,8 +49,11 @@ def fit_plain(
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0
         theta[plant.n_linear :] = of_terms
+        if moved:
+            theta[plant.layout.zeros] = _zeros_at_new_poles(plant, theta, smaller)
         begun.append(theta)
-    tried = on_cores(partial(descend, problem, fixed=~linear, max_steps=2), begun)
+    steps = STEPS_WITH_ZEROS if moved else 2
+    tried = on_cores(partial(descend, problem, fixed=~linear, max_steps=steps), begun)
     tried.sort(key=lambda fit: fit.squares)
     few = FEW_STEPS if len(of_terms) else MAX_STEPS
     fits = on_cores(partial(_go_on, problem, max_steps=few), tried[:FINALISTS])
@@ -54,6 +61,18 @@ def fit_plain(
     # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
     return descend(Problem(plant, records, noise), best.theta, best.local)
+
+
+def _zeros_at_new_poles(plant: Plant, theta: np.ndarray, smaller: Estimate) -> np.ndarray:
+    """Begin as the smaller model: with its zeros, and one in the place of each pole that it does not have."""
+    denominators = (
+        np.array([1.0, *-p.matrix(t)[-1, ::-1]]) for p, t in ((plant, theta), (smaller.plant, smaller.theta))
+    )
+    new, rest = np.polydiv(*denominators)
+    zeros = np.array([1.0, *smaller.theta[smaller.plant.layout.zeros]])  # c_0 + c_1 s + ..
+    if new[-1] and np.allclose(rest, 0.0, atol=1e-9 * np.max(np.abs(new))):
+        zeros = np.convolve(zeros, new[::-1] / new[-1])
+    return np.pad(zeros[1:], (0, plant.zeros + 1 - len(zeros)))
 
 
 def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int, tolerance: float) -> Estimate:

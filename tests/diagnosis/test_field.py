@@ -12,7 +12,7 @@ from simgap.data.simulated.field import RIGS, hide, suitable
 from simgap.diagnosis.diagnose import diagnose
 
 # Hidden effects of each machine that are not named first, as measured, and one more; the aim is 1 of 20.
-MISSED = {"joint_motor": 2}
+MISSED = {"joint_motor": 2, "axis_open": 2}
 
 
 def named(answer):

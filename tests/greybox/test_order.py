@@ -6,9 +6,9 @@ import pytest
 from simgap.data.simulated import field
 from simgap.greybox.identification import identify
 
-from .building import order_chosen, order_of, orders_tried, plain_search
+from .building import order_chosen, order_of, orders_tried, plain_errors, plain_search
 from .parts import experiments
-from .plants import free_run, position, steps, third_order, velocity
+from .plants import Plant, free_run, position, steps, third_order, velocity
 
 DT = 0.1
 
@@ -36,6 +36,19 @@ def test_a_signal_of_no_known_kind_gets_the_order_of_the_plant_behind_it(plant, 
     train, valid = measured(plant)
     assert orders_tried(train, valid, "other")[-1] == order
     assert order_of(plain_search(train, valid, "other")) == order
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_slow_pole_beside_its_zero_is_found_behind_a_fast_plant(seed):
+    # A reading that is half of what follows the input fast, and half of what follows it in five seconds.
+    fast = position()
+    a = np.zeros((3, 3))
+    a[:2, :2], a[2, 2] = fast.a, -0.2
+    plant = Plant(a, np.array([[0.0], [3.0], [0.2 * 3.0 / 4.0]]), np.array([[1.0, 0.0, 1.0]]))
+    train, valid = measured(plant, seed, noise=0.01, shape=(2, 800))
+    search = plain_search(train, valid, "other")
+    assert order_of(search) >= 3
+    assert plain_errors(search).std() < 0.012 * train[0].y.std()
 
 
 def test_beyond_four_an_order_must_be_likelier_in_training_too():
