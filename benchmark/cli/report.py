@@ -10,12 +10,16 @@ import typer
 
 def report(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Folder of results.")] = Path("results"),
+    site: Annotated[Path | None, typer.Option(help="Folder of the site; DIR/site by default.")] = None,
+    no_site: Annotated[bool, typer.Option("--no-site", help="Write no site.")] = False,
+    public: Annotated[bool, typer.Option("--public", help="Leave out signals of data sets without a licence.")] = False,
 ) -> None:
-    """Show the stored results and write leaderboard.md and results.csv next to them."""
+    """Show the stored results, and write leaderboard.md, results.csv and a site to browse them next to them."""
     from rich.console import Console
 
     from simgap.reports import leaderboard
     from simgap.reports.rendering import to_rich
+    from simgap.reports.site.site import write_site
 
     written = leaderboard.report(folder)
     console = Console()
@@ -24,3 +28,6 @@ def report(
         for table in tables:
             console.print(to_rich(table, console.width))
     console.print(f"Written: {written.markdown} and {written.csv}", markup=False, highlight=False)
+    if not no_site:
+        page = write_site(folder, site, public)
+        console.print(f"The site: {page}", markup=False, highlight=False)
