@@ -16,6 +16,7 @@ from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
+NO_SUITES = ("recovery", "artefacts", "site")  # what else stands in a folder of results
 FEW = 2  # data sets, whose figures are shown after a run
 
 HOW_TO_READ = (
@@ -74,7 +75,8 @@ def read_suites(folder: Path) -> dict[str, list[Result]]:
     """Read the rows of all suites in a folder of results. Raises UnusableInput."""
     if not folder.is_dir():
         raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one")
-    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    inside = sorted(path for path in folder.iterdir() if path.is_dir() and path.name not in NO_SUITES)
+    folders = [folder, *inside]
     suites = {path.resolve().name: rows for path in folders if (rows := store.read(path))}
     if not suites:
         raise UnusableInput(f"{folder} holds no results; `simgap run` makes them")

@@ -33,6 +33,11 @@ class Found:
     facts: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def name(self) -> str:
+        """The file without its ending, and without a folder of diagnoses."""
+        return self.source.rpartition(".")[0].removeprefix("diagnoses/")
+
+    @property
     def verdict(self) -> str:
         """The verdict in words."""
         return str(self.facts.get("verdict", "")).replace("_", " ")
@@ -65,16 +70,21 @@ def find(folder: Path, leave_out: Path) -> list[Found]:
 def share_plotly(page: str) -> tuple[str, str, str]:
     """Take the copy of plotly.js out of a page: the page, which loads it from ../assets, its file name, its text.
 
-    Pages of one version of plotly share one file. A page without plots has no copy.
+    Pages of one version of plotly share one file: that of the site where it is the same. A page without plots has no
+    copy.
     """
+    from plotly.offline import get_plotlyjs
+
     page = page.replace("<body>", f"<body>\n{BACK}", 1)
     match = PLOTLY.search(page)
     if match is None:
         return page, "", ""
-    name = f"plotly-{hashlib.sha256(match[1].encode()).hexdigest()[:12]}.js"
+    same = match[1].strip() == get_plotlyjs().strip()
+    name = "plotly.js" if same else f"plotly-{hashlib.sha256(match[1].encode()).hexdigest()[:12]}.js"
     head, tail = page[: match.start()], page[match.end() :]
     head = head.replace(INLINE_ONLY, "script-src 'self' file: 'unsafe-inline'", 1)
-    return f'{head}<script src="../assets/{name}"></script>\n{tail}', name, match[1]
+    loader = f'<script src="../assets/later.js" data-plotly="../assets/{name}"></script>\n'
+    return head + loader + tail, name, match[1]
 
 
 def _files(folder: Path, ending: str, leave_out: Path) -> Iterator[Path]:

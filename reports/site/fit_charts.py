@@ -38,7 +38,7 @@ def _horizon(standing: Standing, output: str, unit: str) -> Chart | None:
         words += f"; {free.median:.3g} {unit} in the free run"
     title = f"Error of {plot_text(output)} against the horizon"
     y = plot_text("RMSE", unit)
-    return chart(title, "samples after the last measured output that is used", y, traces, f"RMSE: {words}.", log="x")
+    return chart(title, "samples ahead", y, traces, f"RMSE: {words}.", log="x", ticks=ahead, legend=True)
 
 
 def training_chart(standing: Standing) -> Chart | None:
@@ -57,4 +57,4 @@ def training_chart(standing: Standing) -> Chart | None:
         return None
     best = f" The lowest loss on validation data: epoch {', '.join(lasts)}." if lasts else ""
     about = f"Losses of {len(fits)} training{'s' if len(fits) > 1 else ''}, on scaled data.{best}"
-    return chart("Training", "epoch", "loss", traces, about, log="y")
+    return chart("Training", "epoch", "loss", traces, about, log="y", legend=len(fits) == 1)

@@ -24,7 +24,7 @@ def model_table(found: Sequence[Standing], title: str) -> Table:
         units = {output: row.units.get(output, "") for row in standing.rows for output in row.metrics}
         for output, unit in units.items():
             rows.append([
-                Cell(standing.dataset), Cell(status), fit, Cell(output), Cell(unit),
+                Cell(standing.dataset), Cell(status), fit, Cell(output), Cell(unit or "not stated"),
                 spread_cell(standing.rmse(output, ()), ".4g", standing.failed),
                 *(_ahead(standing, output, horizon) for horizon in HORIZONS),
                 Cell("" if size is None else str(size), size),

@@ -36,7 +36,9 @@ class Writer:
     def page(self, template: str, file: str, **content: Any) -> None:
         """Render a template into a file."""
         root = "../" * file.count("/")
-        text = self._environment.get_template(template).render(content, file=file, root=root, menu=self.menu)
+        parent = f"{file.partition('/')[0]}.html" if root else ""
+        about = {"file": file, "root": root, "parent": parent, "menu": self.menu}
+        text = self._environment.get_template(template).render(content | about)
         self.text(file, text)
 
     def text(self, file: str, text: str) -> None:

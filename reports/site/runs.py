@@ -83,8 +83,9 @@ def _bode(run: Run, dataset: Dataset | None) -> list[Chart]:
         way = f"{inputs[j][0]} to {outputs[i][0]}" if inputs and outputs else f"input {j + 1} to output {i + 1}"
         gains.append(line(frequency, np.abs(response[:, i, j]), plot_text(way)))
         phases.append(line(frequency, np.degrees(np.unwrap(np.angle(response[:, i, j]))), plot_text(way)))
+    several = len(gains) > 1
     about = f"of the linear model from {1e-3 / dt:.3g} Hz to half the sampling frequency, {0.5 / dt:.3g} Hz."
     return [
-        chart("Gain", "frequency [Hz]", "gain", gains, f"Gain {about}", log="xy"),
-        chart("Phase", "frequency [Hz]", "phase [deg]", phases, f"Phase {about}", log="x"),
+        chart("Gain", "frequency [Hz]", "gain", gains, f"Gain {about}", log="xy", legend=several),
+        chart("Phase", "frequency [Hz]", "phase [deg]", phases, f"Phase {about}", log="x", legend=several),
     ]

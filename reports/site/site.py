@@ -146,7 +146,9 @@ class _Site:
             if not mine:
                 continue
             params = mine[0].rows[0].params
-            parts = [part for standing in sorted(mine, key=lambda s: s.dataset) if (part := self._part(suite, standing))]
+            parts = [
+                part for standing in sorted(mine, key=lambda s: s.dataset) if (part := self._part(suite, standing))
+            ]
             suites.append({
                 "name": suite, "table": model_table(mine, f"{label} on all data sets"), "parts": parts,
                 "params": ", ".join(f"{name} = {value}" for name, value in sorted(params.items())),
@@ -217,18 +219,18 @@ class _Site:
 
 def diagnoses_pages(writer: Writer, found: list[diagnoses.Found]) -> None:
     """Write the pages of all diagnoses and their list; pages with plots share their copy of plotly.js."""
-    keys = file_names(one.source for one in found)
+    keys = file_names(one.name for one in found)
     for one in found:
-        file = f"diagnoses/{keys[one.source]}.html"
+        file = f"diagnoses/{keys[one.name]}.html"
         if one.page:
             page, name, plotly = diagnoses.share_plotly(one.page)
             writer.text(file, page)
-            if name:
+            if name not in ("", "plotly.js"):
                 writer.text(f"assets/{name}", plotly)
         else:
             writer.page("diagnosis.html", file, found=one)
     if found:
-        listed = [(one, f"diagnoses/{keys[one.source]}.html") for one in found]
+        listed = [(one, f"diagnoses/{keys[one.name]}.html") for one in found]
         writer.page("diagnoses.html", "diagnoses.html", found=listed)
 
 

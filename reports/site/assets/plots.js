@@ -7,11 +7,13 @@ const simgap = (() => {
   const fingers = matchMedia("(pointer: coarse)").matches; // they scroll the page; the buttons zoom
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
+  const library = new URL("plotly.js", document.currentScript.src).href; // 5 MB: the text is there before
+
   function want(source) {
     if (!asked.has(source)) {
       asked.set(source, new Promise((resolve, reject) => {
         const script = document.createElement("script");
-        script.onload = () => resolve(held.get(source.split("/data/").pop()));
+        script.onload = () => resolve(held.get(source.split("data/").pop()));
         script.onerror = () => reject(new Error(`${source} is missing; run simgap report again`));
         script.src = source;
         document.head.append(script);
@@ -25,7 +27,8 @@ const simgap = (() => {
     automargin: true, ...more,
   });
 
-  function draw(place, traces, layout) {
+  async function draw(place, traces, layout) {
+    await want(library);
     const whole = {
       template: "none", showlegend: false, margin: { l: 56, r: 12, t: 28, b: 46 }, hovermode: "closest",
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: fingers ? false : "zoom",
@@ -45,15 +48,17 @@ const simgap = (() => {
       return { ...common, mode: one.mode, line, marker: { color: colour, size: 8, symbol: one.symbol ?? "circle" } };
     });
     const log = about.log ?? "";
-    const named = new Set(about.traces.map((one) => one.name)).size > 1;
     return draw(place, traces, {
       height: about.square ? 340 : 290, title: { text: about.title, x: 0, xref: "paper", font: { size: 13 } },
-      xaxis: axis(about.x, { type: log.includes("x") ? "log" : "linear", ...(about.square ? { constrain: "domain" } : {}) }),
+      xaxis: axis(about.x, {
+        type: log.includes("x") ? "log" : "linear", nticks: 6, ...(about.square ? { constrain: "domain" } : {}),
+        ...(about.ticks ? { tickvals: about.ticks } : log.includes("x") ? { dtick: 1 } : {}),
+      }),
       yaxis: axis(about.y, {
         type: log.includes("y") ? "log" : "linear", nticks: 6, ...(log.includes("y") ? { exponentformat: "power" } : {}),
         ...(about.square ? { scaleanchor: "x" } : {}),
       }),
-      showlegend: named && !about.square, legend: { orientation: "h", y: -0.28 },
+      showlegend: Boolean(about.legend), legend: { orientation: "h", y: -0.28 },
     });
   }
 
@@ -73,7 +78,7 @@ const simgap = (() => {
       put(rows.length - 1, one.y[i], "measured", css("measured"), 2.4);
       models.forEach((m) => m.records[number] && put(rows.length - 1, m.records[number].y[i], m.name, m.colour, 1.4, m.dash));
       if (ranges.length) {
-        rows.push({ name: `error of ${name}, measured minus simulated`, height: 130, range: union(ranges.map((r) => r.error_range[i])) });
+        rows.push({ name: `error of ${name}`, height: 130, range: union(ranges.map((r) => r.error_range[i])) });
         models.forEach((m) => m.records[number] && put(rows.length - 1, m.records[number].e[i], m.name, m.colour, 1.2, m.dash));
       }
     });
@@ -97,7 +102,7 @@ const simgap = (() => {
 
   function remember(place, again) {
     drawn.set(place, again);
-    again();
+    return again();
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach((again) => again()));
 
@@ -118,7 +123,7 @@ const simgap = (() => {
       plot.setAttribute("aria-label", `${about.title}. ${about.about}`);
       text.textContent = about.about;
       figure.append(plot, text);
-      whenSeen(plot, () => remember(plot, () => chart(plot, about)));
+      whenSeen(plot, () => begin(plot, () => remember(plot, () => chart(plot, about))));
       return figure;
     }));
   }
@@ -150,8 +155,7 @@ const simgap = (() => {
       const ticked = boxes.filter((box) => box.checked).map((box) => ({ source: box.value, colour: box.colour, dash: box.dash }));
       const models = await Promise.all([...fixed, ...ticked].map(async (m) => ({ ...(await want(m.source)), colour: m.colour, dash: m.dash })));
       const number = Number(choice.value);
-      drawn.set(plot, () => record(plot, signals, number, models));
-      await record(plot, signals, number, models);
+      await remember(plot, () => record(plot, signals, number, models));
       const text = `Record ${choice.selectedOptions[0].text}: measured${models.map((m) => `, ${m.label}`).join("")}`;
       plot.setAttribute("aria-label", `${text}. The figures are in the table of this page.`);
       if (status) status.textContent = text;

@@ -28,10 +28,10 @@
       const button = document.createElement("button");
       button.type = "button";
       const link = head.querySelector("a");
-      button.textContent = head.firstChild.textContent.trim() || head.textContent.trim();
+      button.append(...[...(link ?? head).childNodes].map((node) => node.cloneNode()));
       if (link) {
         link.className = "of";
-        link.setAttribute("aria-label", `page of ${link.textContent}`);
+        link.setAttribute("aria-label", `page of ${link.textContent.trim()}`);
         link.textContent = "page";
       }
       head.replaceChildren(button, ...(link ? [link] : []));
@@ -66,6 +66,7 @@
     form.addEventListener("input", apply);
     form.addEventListener("submit", (event) => event.preventDefault());
     form.hidden = false;
+    form.querySelector("details").open = matchMedia("(min-width: 700px)").matches;
     apply();
   }
 
