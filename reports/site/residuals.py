@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
+from scipy.fft import next_fast_len
 
 from simgap.records import Dataset
 from simgap.reports.site.curves import Chart, chart, line
@@ -22,11 +23,11 @@ def correlations(
     r(k) = sum_t a(t) b(t - k) / sqrt(sum a^2 sum b^2), sums over all records, none of which is glued to the next.
     """
     products, of_a, of_b = np.zeros(2 * lags + 1), 0.0, 0.0
-    for a, b in pairs:
-        a, b = a - a.mean(), b - b.mean()
-        size = 1 << (2 * len(a) - 1).bit_length()
+    for pair in pairs:
+        a, b = (signal - signal.mean() for signal in pair)
+        size = next_fast_len(len(a) + lags, real=True)
         whole = np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
-        products += np.concatenate((whole[-lags:], whole[: lags + 1])) if lags else whole[:1]
+        products += np.concatenate((whole[-lags:], whole[: lags + 1]))
         of_a, of_b = of_a + float(a @ a), of_b + float(b @ b)
     return products / np.sqrt(of_a * of_b) if of_a * of_b > 0 else products * 0
 

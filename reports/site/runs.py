@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from simgap.records import Dataset
 from simgap.reports.diagnosis.traces import axis_range
@@ -35,16 +36,17 @@ def simulated(run: Run, dataset: Dataset) -> dict[str, Any]:
             records.append({
                 "y": [curve(t[part], column) for column in y_hat_part.T],
                 "e": [curve(t[part], column) for column in error.T],
-                "range": [axis_range(y[:, i], [y_hat_part[:, i]]) for i in range(y.shape[1])],
-                "error_range": [axis_range(y[:, i] - y[:, i].mean(), [error[:, i]]) if _wild(y[:, i], error[:, i]) else None
-                                for i in range(y.shape[1])],
+                "range": [axis_range(*pair) for pair in zip(y.T, y_hat_part.T[:, None], strict=True)],
+                "error_range": [_error_range(*pair) for pair in zip(y.T, error.T, strict=True)],
             })  # fmt: skip
     return {"name": plot_text(run.standing.model), "label": printable(run.standing.model), "records": records}
 
 
-def _wild(y: np.ndarray, error: np.ndarray) -> bool:
-    """Tell whether an error is so much larger than the signal that its axis must be cut."""
-    return not np.isfinite(error).all() or float(np.abs(error).max()) > 3 * float(np.ptp(y))
+def _error_range(y: Float[np.ndarray, " N"], error: Float[np.ndarray, " N"]) -> tuple[float, float] | None:
+    """Cut the axis of an error that is so much larger than the signal that nothing else could be seen."""
+    if np.isfinite(error).all() and float(np.abs(error).max()) <= 3 * float(np.ptp(y)):
+        return None
+    return axis_range(y - y.mean(), [error])
 
 
 def charts(run: Run, dataset: Dataset | None) -> list[Chart]:

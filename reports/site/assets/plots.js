@@ -172,6 +172,8 @@ const simgap = (() => {
   }
   const begin = (place, act) => Promise.resolve().then(act).catch((error) => complain(place, error));
 
+  const idle = window.requestIdleCallback ?? setTimeout;
+  addEventListener("load", () => idle(() => want(library))); // so that it is there before a plot is seen
   addEventListener("DOMContentLoaded", () => {
     document.querySelectorAll(".js-only").forEach((element) => { element.hidden = false; });
     document.querySelectorAll(".records").forEach((place) => whenSeen(place, () => begin(place, () => records(place))));
