@@ -19,8 +19,11 @@ def report(
 
     from simgap.reports import leaderboard
     from simgap.reports.rendering import to_rich
-    from simgap.reports.site.site import write_site
+    from simgap.reports.site.site import check_free, write_site
 
+    out = folder / "site" if site is None else site
+    if not no_site:
+        check_free(out)  # before anything is written
     written = leaderboard.report(folder)
     console = Console()
     for suite, tables in written.tables.items():
@@ -29,5 +32,5 @@ def report(
             console.print(to_rich(table, console.width))
     console.print(f"Written: {written.markdown} and {written.csv}", markup=False, highlight=False)
     if not no_site:
-        page = write_site(folder, site, public)
+        page = write_site(folder, out, public)
         console.print(f"The site: {page}", markup=False, highlight=False)

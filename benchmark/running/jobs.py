@@ -7,7 +7,7 @@ import inspect
 import os
 import pickle
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -133,10 +133,11 @@ class Job:
         with contextlib.suppress(Exception):  # neither a full disk nor a model's own attributes must cost the figures
             polynomial = getattr(model, "polynomial", None)
             about = self.about.provenance
-            arguments = replace(self.arguments, data=_absolute(self.arguments.data))
+            source = {"source": _absolute(self.arguments.data), "inputs": self.arguments.inputs,
+                      "outputs": self.arguments.outputs, "dt": self.arguments.dt}  # fmt: skip
             artefacts.write(self.artefact, Artefact(
                 runs, dataset.n_init, dataset.training.dt, about.get("model_sha256", ""), self.card.sha256,
-                () if polynomial is None else polynomial.state_space, asdict(arguments),
+                () if polynomial is None else polynomial.state_space, source,
             ))  # fmt: skip
 
     def portable(self) -> Job:

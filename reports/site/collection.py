@@ -14,7 +14,7 @@ from simgap.reports.pooling import Standing, standings
 from simgap.results import artefacts
 from simgap.results.artefacts import Artefact
 
-NOT_LICENSED = ("", "not stated", "none stated")
+NO_LICENCE = ("not ", "none", "unknown")  # how a card begins that names no licence
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,8 @@ class DataCopy:
         """Whether samples may stand on a page for others: simgap made them, or their licence is stated."""
         if DATASETS.module(self.name).startswith("simgap.data.simulated"):
             return True
-        return dict(self.card).get("Licence", "").rstrip(".").partition(";")[0] not in NOT_LICENSED
+        licence = dict(self.card).get("Licence", "").lower()
+        return bool(licence) and not licence.startswith(NO_LICENCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,9 @@ class Collection:
         wanted = {str(row.provenance.get("data_sha256", "")) for row in rows}
         sources = [run.artefact.source for run in self.runs.values() if run.standing.dataset == name]
         copies = [lambda: load(name)] if name in DATASETS else []
-        copies += [lambda source=source: load(**source) for source in _different(sources) if source.get("data") != name]
+        copies += [
+            lambda source=source: load(**source) for source in _different(sources) if source.get("source") != name
+        ]
         why = "Its files are not known here, so its signals are not shown."
         for load_copy in copies:
             try:

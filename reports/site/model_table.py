@@ -27,8 +27,8 @@ def model_table(found: Sequence[Standing], title: str) -> Table:
                 Cell(standing.dataset), Cell(status), fit, Cell(output), Cell(unit or "not stated"),
                 spread_cell(standing.rmse(output, ()), ".4g", standing.failed),
                 *(_ahead(standing, output, horizon) for horizon in HORIZONS),
-                Cell("" if size is None else str(size), size),
-                Cell("" if seconds is None else f"{seconds:.2g}", seconds),
+                Cell("" if size is None else str(size)),
+                Cell("" if seconds is None else f"{seconds:.2g}"),
             ])  # fmt: skip
     return Table(title, COLUMNS, rows, notes.texts)
 

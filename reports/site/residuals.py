@@ -14,11 +14,11 @@ from simgap.results.artefacts import Artefact
 LAGS = 25
 RECORD_TO_LAG = 5  # a record shorter than so many times the largest lag says little of it
 
+Pairs = list[tuple[np.ndarray, np.ndarray]]  # of records, each of a length of its own
 
-def correlations(
-    pairs: list[tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]], lags: int
-) -> Float[np.ndarray, " L"]:
-    """Correlate a(t) with b(t - k) for k = -lags .. lags over records (a, b), each without its mean.
+
+def correlations(pairs: Pairs, lags: int) -> Float[np.ndarray, " L"]:
+    """Correlate a(t) with b(t - k) for k = -lags .. lags over records (a [N], b [N]), each without its mean.
 
     r(k) = sum_t a(t) b(t - k) / sqrt(sum a^2 sum b^2), sums over all records, none of which is glued to the next.
     """
@@ -32,9 +32,7 @@ def correlations(
     return products / np.sqrt(of_a * of_b) if of_a * of_b > 0 else products * 0
 
 
-def bound(
-    pairs: list[tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]],
-) -> float:
+def bound(pairs: Pairs) -> float:
     """Compute the 95 % bound of r(k) for unrelated a and b, 1.96 sqrt(sum_k r_aa(k) r_bb(k) / N).
 
     Bartlett's formula (Box, Jenkins, Reinsel and Ljung 2016, section 12.1); for white b it is 1.96 / sqrt(N).

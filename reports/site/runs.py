@@ -36,7 +36,7 @@ def simulated(run: Run, dataset: Dataset) -> dict[str, Any]:
             records.append({
                 "y": [curve(t[part], column) for column in y_hat_part.T],
                 "e": [curve(t[part], column) for column in error.T],
-                "range": [axis_range(*pair) for pair in zip(y.T, y_hat_part.T[:, None], strict=True)],
+                "range": [axis_range(a, [b]) for a, b in zip(y.T, y_hat_part.T, strict=True)],
                 "error_range": [_error_range(*pair) for pair in zip(y.T, error.T, strict=True)],
             })  # fmt: skip
     return {"name": plot_text(run.standing.model), "label": printable(run.standing.model), "records": records}

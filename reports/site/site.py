@@ -40,7 +40,7 @@ def write_site(folder: str | Path = "results", out: str | Path | None = None, pu
     folder = Path(folder)
     out = folder / "site" if out is None else Path(out)
     collection = Collection(folder, read_suites(folder), public)
-    _check_free(out)
+    check_free(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out.parent, prefix=".site-") as new:
         site = Path(new) / "site"
@@ -55,7 +55,8 @@ def write_site(folder: str | Path = "results", out: str | Path | None = None, pu
     return out / "index.html"
 
 
-def _check_free(out: Path) -> None:
+def check_free(out: Path) -> None:
+    """Raises UnusableInput for a folder that holds anything but a site."""
     if out.exists() and not out.is_dir():
         raise UnusableInput(f"--site {out}: there is a file of that name; name a folder")
     if out.is_dir() and any(out.iterdir()) and not (out / MARK).exists():
