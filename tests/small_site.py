@@ -18,7 +18,7 @@ EXAMPLES = runpy.run_path(str(Path(__file__).parent / "reports" / "example_findi
 
 @pytest.fixture(scope="session")
 def results_on_disk(tmp_path_factory) -> Path:
-    """Rows and artefacts of three models on the short gimbal, a diagnosis as page and JSON, and eight hidden effects."""
+    """Rows and artefacts of three models on the short gimbal, a diagnosis as page and JSON, eight hidden effects."""
     folder = tmp_path_factory.mktemp("results")
     simgap.run("smoke", models=["mean", "hold", "arx"], datasets=["gimbal_short"], out=folder)
     findings = EXAMPLES["named"].__wrapped__()

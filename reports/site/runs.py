@@ -25,10 +25,9 @@ def simulated(run: Run, dataset: Dataset) -> dict[str, Any]:
     records: list[Any] = []
     for experiment in dataset.test[:MOST]:
         y_hat = run.artefact.runs.get(experiment.name)
-        known = y_hat is not None and y_hat.shape == experiment.y[n:].shape
         t = experiment.dt * np.arange(n, len(experiment))
         for _, part in stretches(experiment, n):
-            if not known:
+            if y_hat is None or y_hat.shape != experiment.y[n:].shape:
                 records.append(None)
                 continue
             y, y_hat_part = experiment.y[n:][part], y_hat[part]

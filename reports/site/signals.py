@@ -74,9 +74,6 @@ def _density(records: list[np.ndarray], dt: float) -> tuple[Float[np.ndarray, " 
     long_enough = [record for record in records if len(record) >= segment >= SHORTEST]
     if not long_enough:
         return None
-    powers = []
-    for record in long_enough:
-        frequency, power = welch(record, fs=1 / dt, nperseg=segment, detrend="constant")
-        powers.append((power, len(record)))
-    mean = sum(power * weight for power, weight in powers) / sum(weight for _, weight in powers)
-    return frequency[1:], np.sqrt(mean[1:])
+    found = [welch(record, fs=1 / dt, nperseg=segment, detrend="constant") for record in long_enough]
+    power = np.average([density for _, density in found], axis=0, weights=list(map(len, long_enough)))
+    return found[0][0][1:], np.sqrt(power[1:])

@@ -19,6 +19,7 @@ from simgap.reports.site.names import file_names
 from simgap.reports.site.residuals import bound, correlations
 from simgap.results import artefacts, store
 
+LOADING = ("src", "href", "data-signals", "data-run", "data-charts", "data-plotly")
 HOSTILE = "</script><img src=x onerror=alert(1)>{{7*7}}"
 
 
@@ -32,8 +33,7 @@ class Links(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         known = dict(attrs)
-        self.targets += [known[name] for name in ("src", "href", "data-signals", "data-run", "data-charts", "data-plotly")
-                         if name in known]  # fmt: skip
+        self.targets += [known[name] for name in LOADING if name in known]
         self.tables += tag == "table"
         self.captions += tag == "caption"
         self.scopes += [known.get("scope")] if tag == "th" else []

@@ -1,4 +1,4 @@
-"""The site in a real browser, from disk: it sorts, filters, overlays, opens a diagnosis, and asks nobody for anything."""
+"""The site in a real browser, from disk: it sorts, filters, overlays, opens a diagnosis, and asks nobody."""
 
 import os
 import shutil
