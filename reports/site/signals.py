@@ -12,19 +12,19 @@ from simgap.reports.rendering import printable
 from simgap.reports.site.curves import POINTS, Chart, chart, curve, line
 from simgap.reports.site.names import plot_text
 
-DETAIL = 2000  # samples of a long record that are shown one by one
+DETAIL = 1000  # samples of a long record that are shown one by one
 MOST = 40  # experiments of a page
 SHORTEST = 16  # samples of which a spectrum says something
 
 
 def stretches(experiment: Experiment, start: int) -> list[tuple[str, slice]]:
-    """Name what is shown of an experiment from row `start` on: all of it, and of a long one a stretch unthinned."""
+    """Name what is shown of an experiment from row `start` on: all of it, and first of a long one a part unthinned."""
     name, rows = experiment.name, len(experiment) - start
     if rows <= POINTS:
         return [(name, slice(0, rows))]
     first = rows // 2 - DETAIL // 2
-    return [(f"{name}, all {rows} samples", slice(0, rows)),
-            (f"{name}, {DETAIL} samples in the middle", slice(first, first + DETAIL))]  # fmt: skip
+    return [(f"{name}, {DETAIL} samples in the middle", slice(first, first + DETAIL)),
+            (f"{name}, all {rows} samples", slice(0, rows))]  # fmt: skip
 
 
 def measured(dataset: Dataset) -> dict[str, Any]:
