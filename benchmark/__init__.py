@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
+    from simgap.reports.figures import write_figures
     from simgap.reports.leaderboard import report
     from simgap.reports.site.site import write_site
     from simgap.results.regression import Regression, check
@@ -34,6 +35,7 @@ _HOME = {
     ),
     "simgap.results.regression": ("Regression", "check"),
     "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
+    "simgap.reports.figures": ("write_figures",),
     "simgap.reports.leaderboard": ("report",),
     "simgap.reports.site.site": ("write_site",),
     "simgap.running.execution": ("Progress",),
@@ -49,7 +51,7 @@ __all__ = [
     "Progress", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "Verification",
     "check", "describe", "diagnose", "export", "fetch", "fit", "load", "load_model", "load_suite", "report", "run",
     "save", "save_model", "simulate", "verify",
-    "write_site",
+    "write_figures", "write_site",
 ]  # fmt: skip
 
 

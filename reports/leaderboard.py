@@ -16,7 +16,7 @@ from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
-NO_SUITES = ("recovery", "artefacts", "site")  # what else stands in a folder of results
+NO_SUITES = ("recovery", "artefacts", "site", "figures")  # what else stands in a folder of results
 FEW = 2  # data sets, whose figures are shown after a run
 
 HOW_TO_READ = (
