@@ -91,8 +91,8 @@ def _horizons(standings: list[Standing]) -> Figure | None:
         ahead = sorted({h for _, points in listed for h, _ in points})
         axes.set_xticks(ahead, [str(h) for h in ahead], minor=False)
         axes.minorticks_off()
-        axes.set_xlabel("samples ahead")
         axes.set_ylabel(_plain(_with_unit(f"RMSE of {output}", units[output])))
+    figure.axes[-1].set_xlabel("samples ahead")
     _legend_above(figure)
     return figure
 

@@ -10,7 +10,7 @@ import pytest
 
 import simgap
 from simgap.diagnosis.recovery import FILE
-from simgap.reports.latex import escape, to_latex
+from simgap.reports.latex import to_latex
 from simgap.reports.tables import Cell, Table
 from simgap.results import store
 
@@ -71,8 +71,9 @@ def test_latex_takes_the_tables(written, tmp_path):
     if not shutil.which("pdflatex"):
         pytest.skip("no pdflatex here; on Debian: apt-get install texlive-latex-base")
     body = "".join(file.read_text() for file in written if file.suffix == ".tex")
-    head = r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage{booktabs}\begin{document}"
-    document = head + body + escape("ü") + r"\end{document}"
+    rules = r"\let\toprule\hline\let\midrule\hline\let\bottomrule\hline"  # booktabs is in another Debian package
+    package = rf"\IfFileExists{{booktabs.sty}}{{\usepackage{{booktabs}}}}{{{rules}}}"
+    document = rf"\documentclass{{article}}{package}\begin{{document}}" + f"\n{body}" + r"\end{document}"
     (tmp_path / "all.tex").write_text(document)
     done = subprocess.run(["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"], cwd=tmp_path,
                           capture_output=True, text=True, check=False)  # fmt: skip
