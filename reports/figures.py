@@ -55,8 +55,11 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
             name = file_names([f"{suite}-{dataset}"])[f"{suite}-{dataset}"]
             if figure := _horizons(here[:BEST]):
                 written += _saved(figure, out / f"{name}-horizon")
-            runs = [run for s in here if (run := collection.runs.get((suite, s.model, dataset)))]
             copy = collection.copy_of(dataset).dataset
+            runs = [
+                run for s in here if (run := collection.runs.get((suite, s.model, dataset)))
+                and collection.copy_behind(run).dataset is not None
+            ]  # fmt: skip
             if runs and copy is not None:
                 written += _saved(_free_run(runs[:OVERLAID], copy), out / f"{name}-free-run")
     if cases := recovery.read(folder):

@@ -14,6 +14,7 @@ from simgap.reports.pooling import Standing, standings
 from simgap.results import artefacts
 from simgap.results.artefacts import Artefact
 
+OTHER_COPY = "Signals are not shown: the copy at hand differs from the one that these rows were scored on."
 NO_LICENCE = ("not ", "none", "unknown")  # how a card begins that names no licence
 
 
@@ -115,6 +116,13 @@ class Collection:
             self._copies[name] = self._found(name)
         return self._copies[name]
 
+    def copy_behind(self, run: Run) -> DataCopy:
+        """Find the user's copy of the data that a fit was scored on."""
+        copy = self.copy_of(run.standing.dataset)
+        if copy.dataset is not None and copy.dataset.sha256 != run.artefact.data_sha256:
+            return DataCopy(copy.name, None, OTHER_COPY)
+        return copy
+
     def _found(self, name: str) -> DataCopy:
         rows = [row for listed in self.suites.values() for row in listed if row.dataset == name]
         wanted = {str(row.provenance.get("data_sha256", "")) for row in rows}
@@ -134,7 +142,7 @@ class Collection:
             else:
                 if dataset.sha256 in wanted:
                     return self._allowed(DataCopy(name, dataset))
-                why = "Signals are not shown: the copy at hand differs from the one that these rows were scored on."
+                why = OTHER_COPY
         return DataCopy(name, None, why)
 
     def _allowed(self, copy: DataCopy) -> DataCopy:

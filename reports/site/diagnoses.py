@@ -14,6 +14,7 @@ from typing import Any
 from simgap.findings import Value
 from simgap.results.artefacts import FOLDER
 
+MARK = ".simgap-site"  # of a folder that holds a site, which may be written anew
 LARGEST = 64 << 20  # bytes of a file that is looked at
 TITLE = re.compile(r"<title>Diagnosis of (.*?)</title>", re.DOTALL)
 HEADLINE = re.compile(r"<h1>(.*?)</h1>", re.DOTALL)
@@ -48,10 +49,10 @@ class Found:
         return [Value(p["name"], p["unit"], p["value"], p["low"], p["high"]) for p in known]
 
 
-def find(folder: Path, leave_out: Path) -> list[Found]:
-    """Find all diagnoses below a folder; a page and a JSON file of one name belong together."""
-    pages = {path.with_suffix(""): path for path in _files(folder, ".html", leave_out)}
-    facts = {path.with_suffix(""): path for path in _files(folder, ".json", leave_out)}
+def find(folder: Path) -> list[Found]:
+    """Find all diagnoses below a folder, sites left out; a page and a JSON file of one name belong together."""
+    pages = {path.with_suffix(""): path for path in _files(folder, ".html")}
+    facts = {path.with_suffix(""): path for path in _files(folder, ".json")}
     found = []
     for stem in sorted({*pages, *facts}):
         page = pages[stem].read_text("utf-8", "replace") if stem in pages else ""
@@ -87,10 +88,11 @@ def share_plotly(page: str) -> tuple[str, str, str]:
     return head + loader + tail, name, match[1]
 
 
-def _files(folder: Path, ending: str, leave_out: Path) -> Iterator[Path]:
+def _files(folder: Path, ending: str) -> Iterator[Path]:
+    sites = {mark.parent for mark in folder.rglob(MARK)}
     for path in sorted(folder.rglob(f"*{ending}")):
         inside = path.relative_to(folder).parts
-        if leave_out in path.parents or inside[0] == FOLDER or any(part.startswith(".") for part in inside):
+        if sites & {*path.parents} or inside[0] == FOLDER or any(part.startswith(".") for part in inside):
             continue
         if path.is_file() and path.stat().st_size <= LARGEST:
             yield path

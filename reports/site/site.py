@@ -17,13 +17,13 @@ from simgap.reports.pooling import Standing
 from simgap.reports.published import WARNING, published_tables
 from simgap.reports.site import diagnoses, recovery, runs, signals
 from simgap.reports.site.collection import Collection, Run, group_of
+from simgap.reports.site.diagnoses import MARK
 from simgap.reports.site.fit_charts import horizon_charts, training_chart
 from simgap.reports.site.model_table import model_table
 from simgap.reports.site.names import file_names, script
 from simgap.reports.site.pages import Writer, unique
 from simgap.reports.tables import dataset_table, overview
 
-MARK = ".simgap-site"  # of a folder that may be written anew
 NO_RUNS = (
     "Simulated outputs are not at hand: simgap run keeps them beside the results, in a folder that is not committed. "
     "The curves below come from the rows."
@@ -48,7 +48,7 @@ def write_site(folder: str | Path = "results", out: str | Path | None = None, pu
         (site / MARK).write_text("simgap report writes this folder anew each time.\n", encoding="utf-8")
         if not public:  # it may hold samples of data sets that others may not be given
             (site / ".gitignore").write_text("*\n", encoding="utf-8")
-        _Site(collection, site, diagnoses.find(folder, out)).write()
+        _Site(collection, site, diagnoses.find(folder)).write()
         if out.exists():
             out.rename(Path(new) / "old")
         shutil.move(site, out)
@@ -121,7 +121,10 @@ class _Site:
     def _dataset(self, name: str) -> None:
         key = self.dataset_keys[name]
         copy = self.collection.copy_of(name)
-        here = [run for (_, _, dataset), run in self.collection.runs.items() if dataset == name]
+        here = [
+            run for (_, _, dataset), run in self.collection.runs.items()
+            if dataset == name and self.collection.copy_behind(run).dataset is not None
+        ]  # fmt: skip
         if copy.dataset is not None:
             self._script(f"signals/{key}", signals.measured(copy.dataset))
             self._script(f"spectra/{key}", {"charts": signals.spectra(copy.dataset)})
@@ -164,12 +167,12 @@ class _Site:
     def _part(self, suite: str, standing: Standing) -> dict | None:
         """Write what is drawn of one model on one data set; None where there is nothing to draw."""
         run = self.collection.runs.get((suite, standing.model, standing.dataset))
-        copy = self.collection.copy_of(standing.dataset)
+        copy = self.collection.copy_behind(run) if run else None
         charts = horizon_charts(standing)
         losses = training_chart(standing)
         charts += [losses] if losses else []
         content = {}
-        if run is not None:
+        if run is not None and copy is not None:
             charts += runs.charts(run, copy.dataset)
             content = runs.simulated(run, copy.dataset) if copy.dataset else {}
         if not charts and not content:
@@ -180,7 +183,7 @@ class _Site:
         return {
             "dataset": standing.dataset, "key": key, "fit": f"{fit.median:.1f}" if fit else "",
             "signals": f"signals/{self.dataset_keys[standing.dataset]}" if content else "",
-            "seed": run.seed if run else None, "why_not": copy.why_not if run else "",
+            "seed": run.seed if run else None, "why_not": copy.why_not if copy else "",
         }  # fmt: skip
 
     def _lists(self) -> None:

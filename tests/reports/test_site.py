@@ -105,6 +105,11 @@ def test_a_diagnosis_shares_plotly_and_one_that_is_json_only_has_a_page_too(site
     assert (site / "diagnoses.html").read_text().count("<tr>") == 3
 
 
+def test_the_pages_of_an_older_site_are_no_diagnoses(site, results_on_disk, tmp_path):
+    again = simgap.write_site(results_on_disk, tmp_path / "second").parent
+    assert (again / "diagnoses.html").read_text() == (site / "diagnoses.html").read_text()
+
+
 def test_the_confusion_matrix_counts_what_was_named(site):
     page = (site / "recovery.html").read_text()
     assert re.search(r'dead zone \(8\)</th><td class="shade" style="--share: 12">1</td>'
