@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from simgap.protocol import Model
     from simgap.records import Channel, Channels, Dataset, Experiment, Result, TrainingSet, UnusableInput
     from simgap.registry import DATASETS, EFFECTS, MODELS
+    from simgap.reports.figures import write_figures
     from simgap.reports.leaderboard import report
+    from simgap.reports.site.site import write_site
     from simgap.results.regression import Regression, check
     from simgap.running.execution import Progress
     from simgap.running.fitting import Fit, fit
@@ -33,7 +35,9 @@ _HOME = {
     ),
     "simgap.results.regression": ("Regression", "check"),
     "simgap.registry": ("DATASETS", "EFFECTS", "MODELS"),
+    "simgap.reports.figures": ("write_figures",),
     "simgap.reports.leaderboard": ("report",),
+    "simgap.reports.site.site": ("write_site",),
     "simgap.running.execution": ("Progress",),
     "simgap.running.runner": ("run",),
     "simgap.running.suites": ("Suite", "load_suite"),
@@ -47,6 +51,7 @@ __all__ = [
     "Progress", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "Verification",
     "check", "describe", "diagnose", "export", "fetch", "fit", "load", "load_model", "load_suite", "report", "run",
     "save", "save_model", "simulate", "verify",
+    "write_figures", "write_site",
 ]  # fmt: skip
 
 

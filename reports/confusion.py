@@ -6,7 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Row = Mapping[str, Any]
 NOTHING, UNEXPLAINED, SUSPECTED = "nothing found", "unexplained", "suspected"
@@ -61,11 +64,14 @@ def summary(rows: Sequence[Row], right: Sequence[bool]) -> list[tuple[str, str]]
 
 
 def picture(rows: Sequence[Row], file: Path) -> None:
-    """The matrix as a PNG: rows what was hidden, columns what was named first, in percent of the visible cases."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    """The matrix as a picture in a file, PNG by its ending."""
+    drawn(matrix(rows)).savefig(file)
+
+
+def drawn(counts: Mapping[str, Counter[str]]) -> Figure:
+    """The matrix: rows what was hidden, columns what was named first, in percent of the visible cases."""
     from matplotlib.figure import Figure
 
-    counts = matrix(rows)
     hidden = sorted(counts)
     answers = sorted({name for counter in counts.values() for name in counter} - {SUSPECTED, NOTHING, UNEXPLAINED})
     answers += [SUSPECTED, NOTHING, UNEXPLAINED]
@@ -82,4 +88,4 @@ def picture(rows: Sequence[Row], file: Path) -> None:
     axes.set_yticks(range(len(hidden)), [f"{h.replace('_', ' ')} ({counts[h].total()})" for h in hidden], fontsize=8)
     axes.set_xlabel("named first")
     axes.set_ylabel("hidden (cases that the reference sees)")
-    FigureCanvasAgg(figure).print_png(str(file))
+    return figure

@@ -16,9 +16,10 @@ from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
+NO_SUITES = ("recovery", "artefacts", "site", "figures")  # what else stands in a folder of results
 FEW = 2  # data sets, whose figures are shown after a run
 
-_HOW_TO_READ = (
+HOW_TO_READ = (
     "Every model is simulated over the whole test record from its first measured outputs alone (free run). "
     "Fit is 100 (1 - RMSE / standard deviation), pooled over test experiments and outputs; the best of a "
     "column is bold. 'k ahead' is the RMSE of a forecast k samples after the last measured output it uses. "
@@ -41,7 +42,7 @@ def report(folder: str | Path = "results") -> Report:
     Raises UnusableInput when there are no results or a file is damaged.
     """
     folder = Path(folder)
-    suites = _read(folder)
+    suites = read_suites(folder)
     tables = {suite: tables_of(results) for suite, results in suites.items()}
     markdown, csv = folder / "leaderboard.md", folder / "results.csv"
     markdown.write_text(_page(tables), encoding="utf-8")
@@ -70,26 +71,28 @@ def _of_datasets(results: list[Result]) -> list[Table]:
     return [dataset_table(results, dataset) for dataset in sorted({result.dataset for result in results})]
 
 
-def _read(folder: Path) -> dict[str, list[Result]]:
+def read_suites(folder: Path) -> dict[str, list[Result]]:
+    """Read the rows of all suites in a folder of results. Raises UnusableInput."""
     if not folder.is_dir():
         raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one")
-    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    inside = sorted(path for path in folder.iterdir() if path.is_dir() and path.name not in NO_SUITES)
+    folders = [folder, *inside]
     suites = {path.resolve().name: rows for path in folders if (rows := store.read(path))}
     if not suites:
         raise UnusableInput(f"{folder} holds no results; `simgap run` makes them")
     return suites
 
 
-_ABOUT = {
+ABOUT_SUITE = {
     "smoke": "The reference of `simgap check`: a small data set, on which the networks are hardly trained. It says "
     "whether a change of the code changed a figure, not which model is good.",
 }
 
 
 def _page(tables: dict[str, list[Table]]) -> str:
-    parts = ["# Leaderboard\n", _HOW_TO_READ + "\n"]
+    parts = ["# Leaderboard\n", HOW_TO_READ + "\n"]
     for suite, listed in tables.items():
         parts.append(f"## Suite {escape(suite)}\n")
-        parts += [f"{_ABOUT[suite]}\n"] if suite in _ABOUT else []
+        parts += [f"{ABOUT_SUITE[suite]}\n"] if suite in ABOUT_SUITE else []
         parts += [to_markdown(table, level=3) for table in listed]
     return "\n".join([*parts, published_markdown()])

@@ -9,6 +9,10 @@ from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Cell, Table
 
 FILE = Path(__file__).parent / "published.toml"
+WARNING = (
+    "Free-run RMSE as printed by others. These models were not run here, and other samples were scored: "
+    "compare with care."
+)
 
 
 def published_tables() -> list[Table]:
@@ -28,9 +32,5 @@ def published_tables() -> list[Table]:
 
 def published_markdown() -> str:
     """Write the section of a report, with a warning on top."""
-    warning = (
-        "Free-run RMSE as printed by others. These models were not run here, and other samples were scored: "
-        "compare with care."
-    )
     tables = [to_markdown(table, level=3) for table in published_tables()]
-    return "\n".join(["## Published by others\n", escape(warning) + "\n", *tables])
+    return "\n".join(["## Published by others\n", escape(WARNING) + "\n", *tables])

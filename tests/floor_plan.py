@@ -31,7 +31,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "saved": GROUND | RUN | {"data"},
     "exports": GROUND | RUN | {"data", "greybox", "saved"},
     "contract": GROUND | RUN | {"data", "saved"},
-    "reports": {"records", "metrics", "results", "findings", "wording", "greybox.effects"},
+    # The site shows signals from the user's copy of a data set, and what a model is.
+    "reports": {"records", "registry", "metrics", "results", "data", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "their_simulation", "data", "greybox", "error_views", "reports"},
     "simgap": GROUND | RUN | {"data", "diagnosis", "exports", "reports", "saved"},

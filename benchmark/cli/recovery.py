@@ -32,8 +32,8 @@ def run(rigs: list[str], seeds: int, engine: str, jobs: int, address: str | None
         results = recovery(Grid(tuple(rigs), seeds=seeds), Execution(engine, jobs, {"address": address}, out, listener))
     rows = [asdict(result) for result in results]
     figures = confusion.summary(rows, [result.right for result in results])
-    if json is not None:
-        write_json(json, dict(figures))
+    for wanted in filter(None, (json, out / FILE.with_name("summary.json"))):
+        write_json(wanted, dict(figures))
     file = out / FILE.with_name("confusion.png")
     confusion.picture(rows, file)
     for label, text in figures:

@@ -25,7 +25,7 @@ def key(result: Result) -> Key:
 
 def path_of(folder: Path, suite: str, model: str) -> Path:
     """The file of one model; a name becomes a file name by replacing what means something in a path."""
-    return Path(folder) / _file_name(suite) / f"{_file_name(model)}.jsonl"
+    return Path(folder) / file_name(suite) / f"{file_name(model)}.jsonl"
 
 
 def writable(folder: Path) -> Path:
@@ -109,5 +109,6 @@ def _encoded_lines(rows: Sequence[Result]) -> bytes:
     return "".join(encode(row) + "\n" for row in rows).encode()
 
 
-def _file_name(name: str) -> str:
+def file_name(name: str) -> str:
+    """Make a file name of any name by replacing what means something in a path."""
     return re.sub(r"[^A-Za-z0-9_.-]", "_", name).lstrip(".") or "_"

@@ -65,7 +65,8 @@ def fit(
         provenance=provenance(threads_in_force()) | {"data_sha256": dataset.sha256},
     )  # fmt: skip
     about = fit_model(built, dataset.training, about)
-    return Fit(built, score_model(built, dataset, [TASKS[name]() for name in USUAL], about))
+    results, _ = score_model(built, dataset, [TASKS[name]() for name in USUAL], about)
+    return Fit(built, results)
 
 
 def model_class(reference: str) -> type:
@@ -121,15 +122,22 @@ def _chosen(model: Model) -> dict[str, Any]:
     return fitted if isinstance(fitted, dict) else {"fitted": fitted}
 
 
-def score_model(model: Model, dataset: Dataset, tasks: Sequence[Task], about: Result) -> list[Result]:
-    """Score every test experiment for every task. A model that fails on one is still asked for the others."""
-    results = []
+def score_model(
+    model: Model, dataset: Dataset, tasks: Sequence[Task], about: Result
+) -> tuple[list[Result], dict[str, Float[np.ndarray, "N ny"]]]:
+    """Score every test experiment for every task, and give the free run of each that was simulated.
+
+    A model that fails on one is still asked for the others.
+    """
+    results, runs = [], {}
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
         evaluation = Evaluation(simulate, experiment, dataset.n_init, dataset.channels)
         results += [_score(evaluation, simulate, task, about) for task in tasks]
+        if "free_run" in vars(evaluation):  # cached, unless no task asked for it or it was not possible
+            runs[experiment.name] = evaluation.free_run
     units = {channel.name: channel.unit for channel in dataset.channels.outputs}
-    return [replace(result, units=units) for result in results]
+    return [replace(result, units=units) for result in results], runs
 
 
 def _score(evaluation: Evaluation, simulate: CheckedSimulation, task: Task, about: Result) -> Result:

@@ -11,9 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from simgap.metrics import failed_metrics
+from simgap.protocol import Model
 from simgap.records import Channels, Dataset, Result, Status
 from simgap.registry import MODELS
+from simgap.results import artefacts
+from simgap.results.artefacts import Artefact
 from simgap.results.store import plain
 from simgap.running.engines.engine import shared_folder
 from simgap.running.fitting import build, fit_model, model_class, reason, score_model
@@ -59,7 +64,10 @@ class Card:
 
 @dataclass(frozen=True)
 class Job:
-    """One fit with all its simulations; `preload` are modules that are imported once for all jobs."""
+    """One fit with all its simulations; `preload` are modules that are imported once for all jobs.
+
+    `artefact` is the file that takes its free runs; without one they are not kept.
+    """
 
     entry: Entry
     arguments: LoadArguments
@@ -68,6 +76,7 @@ class Job:
     tasks: tuple[str, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
     preload: tuple[str, ...] = ()
+    artefact: Path | None = None
 
     def __str__(self) -> str:
         return f"{self.entry.label} on {self.card.name}, seed {self.seed}"
@@ -112,17 +121,32 @@ class Job:
         except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
             return self.failed("error", reason("fit", error))
         try:
-            return score_model(model, dataset, [TASKS[name]() for name in self.tasks], about)
+            results, runs = score_model(model, dataset, [TASKS[name]() for name in self.tasks], about)
         except BaseException as error:
             return self.failed("error", reason("simulate", error))
+        self._leave_artefact(model, dataset, runs)
+        return results
+
+    def _leave_artefact(self, model: Model, dataset: Dataset, runs: dict[str, np.ndarray]) -> None:
+        if self.artefact is None or not runs:
+            return
+        with contextlib.suppress(Exception):  # neither a full disk nor a model's own attributes must cost the figures
+            polynomial = getattr(model, "polynomial", None)
+            about = self.about.provenance
+            source = {"source": _absolute(self.arguments.data), "inputs": self.arguments.inputs,
+                      "outputs": self.arguments.outputs, "dt": self.arguments.dt}  # fmt: skip
+            artefacts.write(self.artefact, Artefact(
+                runs, dataset.n_init, dataset.training.dt, about.get("model_sha256", ""), self.card.sha256,
+                () if polynomial is None else polynomial.state_space, source,
+            ))  # fmt: skip
 
     def portable(self) -> Job:
         """The same job with absolute paths."""
         file, colon, name = self.entry.name.rpartition(":")
         entry = replace(self.entry, name=f"{Path(file).absolute()}:{name}") if colon else self.entry
-        data = Path(self.arguments.data)
-        arguments = replace(self.arguments, data=str(data.absolute())) if data.exists() else self.arguments
-        return replace(self, entry=entry, arguments=arguments)
+        arguments = replace(self.arguments, data=_absolute(self.arguments.data))
+        artefact = None if self.artefact is None else self.artefact.absolute()
+        return replace(self, entry=entry, arguments=arguments, artefact=artefact)
 
     def has_its_code(self) -> bool:
         """Whether the model's code is that of the digest."""
@@ -143,6 +167,11 @@ def _load(arguments: LoadArguments, sha256: str) -> Dataset:
             partial.replace(file)
         return dataset
     return pickle.loads(file.read_bytes())  # from the run's own folder, which nobody else may write
+
+
+def _absolute(data: str) -> str:
+    """The absolute path of a file or folder; a registered name stays."""
+    return str(Path(data).absolute()) if Path(data).exists() else data
 
 
 def model_code(entry: Entry) -> Code:

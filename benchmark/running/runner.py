@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from simgap.records import Result
-from simgap.results import store
+from simgap.results import artefacts, store
 from simgap.running import planning
 from simgap.running.execution import Execution, Listener, carry_out, log_messages
 from simgap.running.jobs import Job
@@ -51,6 +52,7 @@ def run_suite(suite: Suite, choice: Choice, execution: Execution) -> list[Result
     data = planning.choose_data(suite, choice.load_arguments, execution.send)
     planned = planning.plan(suite, entries, data, provenance(execution.threads))
     folder = store.writable(execution.out)
+    planned = [replace(job, artefact=artefacts.path_of(folder, suite.name, job.about)) for job in planned]
     results, todo = _split(planned, planning.stored_rows(planned, folder, suite))
     if len(todo) < len(planned):
         execution.send(f"{len(planned) - len(todo)} of {len(planned)} jobs are done already and were not run again")

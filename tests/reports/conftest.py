@@ -1,8 +1,10 @@
-"""Results of two models on one data set, one of them broken."""
+"""Results of two models on one data set, one of them broken; a small data set and a small site on disk."""
 
 import math
 
 import pytest
+from small_data import dataset  # noqa: F401
+from small_site import results_on_disk, site  # noqa: F401
 
 from simgap.records import Result
 
