@@ -18,10 +18,10 @@ def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarra
 
 
 def excerpt(experiments: Sequence[Experiment], samples: int) -> list[Experiment]:
-    """Take experiments until there are enough samples, and cut the last."""
+    """Take experiments until there are enough samples, of the last one its end: records often begin at rest."""
     taken: list[Experiment] = []
     for experiment in experiments:
         if samples > 0:
-            taken.append(experiment[:samples])
+            taken.append(experiment[max(len(experiment) - samples, 0) :])
             samples -= len(experiment)
     return taken
