@@ -115,7 +115,9 @@ class BlockError:
         if "f1" in self.free and len(model.f1) > 1:
             twice = divide(run.x, model.f1)
             for k in range(1, len(model.f1)):
-                parts["f1"].append(-sum(model.through(i, run.slope[i] * _delayed(twice[i], k)) for i in range(m)))
+                parts["f1"].append(
+                    -np.sum([model.through(i, run.slope[i] * _delayed(twice[i], k)) for i in range(m)], axis=0)
+                )
         if "c" in self.free:
             for i in range(m):
                 columns = basis(run.x[i].ravel(), model.low[i], model.step[i], model.c.shape[1])

@@ -179,8 +179,9 @@ def _partitions(f: np.ndarray, b: np.ndarray) -> Iterator[tuple[np.ndarray, ...]
 
 def _groups(roots: np.ndarray, most: int = 5) -> list[list[complex]]:
     """Group roots that stay together: conjugate pairs, and beyond `most` groups the nearest real ones."""
-    pairs = [[complex(r), complex(r).conjugate()] for r in roots if r.imag > 0]
-    groups = pairs + [[complex(r)] for r in sorted(roots[roots.imag == 0].real)]
+    values: list[complex] = [complex(r) for r in roots]
+    groups = [[r, r.conjugate()] for r in values if r.imag > 0]
+    groups += [[r] for r in sorted((r for r in values if r.imag == 0), key=lambda r: r.real)]
     while len(groups) > most:
         last = groups.pop()
         groups[-1] = groups[-1] + last
@@ -188,9 +189,11 @@ def _groups(roots: np.ndarray, most: int = 5) -> list[list[complex]]:
 
 
 def _polynomials(groups: list[list[complex]], chosen: Sequence[bool]) -> tuple[np.ndarray, np.ndarray]:
-    sides = [[r for group, first in zip(groups, chosen, strict=True) if first == side for r in group]
-             for side in (True, False)]  # fmt: skip
-    return tuple(np.atleast_1d(np.real(np.poly(side))) for side in sides)
+    def side(first: bool) -> np.ndarray:
+        roots = [r for group, taken in zip(groups, chosen, strict=True) if taken == first for r in group]
+        return np.atleast_1d(np.real(np.poly(roots)))
+
+    return side(True), side(False)
 
 
 def _with_curve(share: tuple, f: np.ndarray, batches: list, u_mean: np.ndarray, y_mean: float) -> Blocks:

@@ -40,7 +40,7 @@ class Blocks:
     @property
     def states(self) -> tuple[int, int]:
         """Past samples that act on the future through 1/f1, of each branch, and through 1/f2."""
-        return tuple(max(len(f) - 1, b.shape[-1] - 1) for f, b in ((self.f1, self.b1), (self.f2, self.b2)))
+        return max(len(self.f1), self.b1.shape[-1]) - 1, max(len(self.f2), self.b2.shape[-1]) - 1
 
     def simulate(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n"]) -> Float[np.ndarray, "B T-n"]:
         """Run free from the state that the first n samples show."""
@@ -121,7 +121,7 @@ class Run:
         for i in range(m):
             f, df = spline(x[i].ravel(), model.low[i], model.step[i], model.c[i])
             w[i], slope[i] = f.reshape(batch, length), df.reshape(batch, length)
-        y = sum(model.through(i, w[i], whole=False) for i in range(m))
+        y = np.sum([model.through(i, w[i], whole=False) for i in range(m)], axis=0)
         y[:, : min(second, length)] += z[:, m * first :][:, :length]
         return cls(model, x, w, slope, divide(y, model.f2))
 
