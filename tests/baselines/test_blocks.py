@@ -107,7 +107,7 @@ def test_the_start_state_is_found_from_the_first_samples():
 
 @pytest.mark.slow
 def test_the_wiener_hammerstein_benchmark_is_simulated_to_half_a_millivolt(measured):
-    """0.28 mV is published for this structure (Wills and Ninness 2012), 0.24 mV for SUBNET."""
+    """Published: 0.241 mV for SUBNET (Beintema, Schoukens and Toth 2023)."""
     done = simgap.fit("wiener-hammerstein", "wiener_hammerstein")
     (row,) = [r for r in done.results if r.task == "free_run"]
     assert row.metrics["y"]["rmse"] < 0.5e-3
