@@ -8,7 +8,11 @@ from floor_plan import ROOT, modules
 from jaxtyping import install_import_hook
 
 # Called a hundred thousand times by one search; checks would make them five times as slow.
-INSIDE_A_FIT = ("greybox.fitting", "greybox.problem", "greybox.simulation", "greybox.plant", "greybox.levenberg")
+INSIDE_A_FIT = (
+    "greybox.fitting", "greybox.problem", "greybox.simulation", "greybox.plant", "greybox.levenberg",
+    "baselines.estimation.blocks", "baselines.estimation.block_error", "baselines.estimation.block_search",
+    "baselines.estimation.filters", "baselines.estimation.levenberg", "baselines.estimation.narx_error",
+)  # fmt: skip
 
 
 def _modules() -> list[str]:

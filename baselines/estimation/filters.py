@@ -16,4 +16,6 @@ def multiply(b: np.ndarray | Sequence[float], signal: np.ndarray, axis: int = -1
 
 def divide(signal: np.ndarray, f: np.ndarray | Sequence[float], axis: int = -1) -> np.ndarray:
     """Compute x / F(q) with F monic: y(t) = x(t) - sum_k f_k y(t-k)."""
+    if len(f) == 1:  # SciPy would convolve row by row in Python
+        return np.array(signal)
     return np.asarray(lfilter([1.0], f, signal, axis=axis))
