@@ -36,10 +36,10 @@ def fit_plain(
     begun = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it. Zeros that are known of
     # a smaller model move along.
-    moved = bool(plant.zeros and smaller is not None and smaller.plant.zeros)
+    with_zeros = smaller if plant.zeros and smaller is not None and smaller.plant.zeros else None
     linear = np.zeros(plant.size, dtype=bool)
     linear[plant.layout.gains] = linear[plant.layout.offset] = True
-    linear[plant.layout.zeros] = moved
+    linear[plant.layout.zeros] = with_zeros is not None
     if shapes is None:
         shapes = list(
             denominator_grid(plant, records) if smaller is None else larger_denominators(plant, records, smaller)
@@ -49,10 +49,10 @@ def fit_plain(
         theta[plant.layout.poles] = shape
         theta[plant.layout.velocity] = 1.0
         theta[plant.n_linear :] = of_terms
-        if moved:
-            theta[plant.layout.zeros] = _zeros_at_new_poles(plant, theta, smaller)
+        if with_zeros is not None:
+            theta[plant.layout.zeros] = _zeros_at_new_poles(plant, theta, with_zeros)
         begun.append(theta)
-    steps = STEPS_WITH_ZEROS if moved else 2
+    steps = STEPS_WITH_ZEROS if with_zeros is not None else 2
     tried = on_cores(partial(descend, problem, fixed=~linear, max_steps=steps), begun)
     tried.sort(key=lambda fit: fit.squares)
     few = FEW_STEPS if len(of_terms) else MAX_STEPS
