@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports.folders import About
-from simgap.exports.joints import Joint, numbers_of, start_of
+from simgap.exports.joint_models import drives, start_of
+from simgap.exports.joints import Joint, numbers_of
 from simgap.exports.ranges import spread
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.records import UnusableInput
@@ -58,7 +59,7 @@ def write(root: ET.Element, file: Path, subject: Subject, joint: Joint, remake: 
     about: dict[str, Any] = {
         "kind": joint.kind, "si_per_unit": joint.scale, "inertia": joint.inertia, "gains": joint.gains,
         "effort": [one.get("clip") for one in joint.inputs], "substeps": SUBSTEPS[joint.rough],
-        "of_velocity": plant.kind == "velocity", "outputs": list(fitted.outputs),
+        "inputs": list(drives(plant)), "of_velocity": plant.kind == "velocity", "outputs": list(fitted.outputs),
         "ranges": {name: list(both) for name, both in ranges.items()},
         "velocity_gain": float(theta[plant.layout.velocity][0]) if plant.two_outputs else 1.0,
         "starts": {record.name: asdict(start_of(subject, joint, record)) for record in subject.records},
@@ -96,7 +97,7 @@ def run(
 ) -> Float[np.ndarray, "N ny"]:
     """Step MuJoCo through a record; `effort`: the inputs become a force on the joint, else they are the controls."""
     mujoco = engine()
-    start, substeps = joint["starts"][record.name], joint["substeps"]
+    start, substeps, inputs = joint["starts"][record.name], joint["substeps"], record.u[:, joint["inputs"]]
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = start["position"], start["velocity"]
     if model.na:
@@ -106,9 +107,9 @@ def run(
         if n := int(model.actuator_history[i][0]):
             times = model.opt.timestep * np.arange(-n, 0)
             rows = row + np.floor(times / about.dt + 1e-9).astype(int)
-            mujoco.mj_initCtrlHistory(model, data, i, times, record.u[np.maximum(rows, 0), i])
+            mujoco.mj_initCtrlHistory(model, data, i, times, inputs[np.maximum(rows, 0), i])
     motion = []
-    for u in record.u[row:]:
+    for u in inputs[row:]:
         motion.append((float(data.qpos[0]), float(data.qvel[0])))
         if effort:
             data.qfrc_applied[0] = force(joint, u)

@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports import joint_runs, joints
+from simgap.exports import joint_models, joint_runs
 from simgap.exports.folders import About, file_in
+from simgap.exports.joint_models import joint_of
 from simgap.exports.joint_runs import STIFF
-from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, body, joint_of
+from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, armature, body
 from simgap.exports.patching import Robot, patched
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
 
 FILE = "model.xml"
-refusal, missing = joints.refusal, joint_runs.missing
+refusal, missing, prepare = joint_models.refusal, joint_runs.missing, joint_models.steady
 
 
 def check(subject: Subject) -> float:
@@ -32,6 +33,8 @@ def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
         "damping": _series(joint.damping, joint.drag),
         "stiffness": _series(joint.stiffness, *joint.stiffness_by_position),
     }
+    if joint.carried is not None:
+        made["armature"] = repr(armature(joint))
     soft = f"{2 * step!r} 1"
     if joint.frictionloss:
         made |= {"frictionloss": repr(joint.frictionloss), "solimpfriction": STIFF, "solreffriction": soft}
@@ -44,10 +47,10 @@ def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
     """The attributes of <general>, one for each input; a constant load goes with the first one."""
     made = []
     for i, (gain, one) in enumerate(zip(joint.gains, joint.inputs, strict=True)):
-        bias = joint.bias if i == 0 else 0.0
+        bias, (stiffness, damping) = (joint.bias, joint.holds) if i == 0 else (0.0, (0.0, 0.0))
         actuator = {"name": f"{name}_input{i}", "joint": name, "gainprm": repr(gain)}
-        if bias:
-            actuator |= {"biastype": "affine", "biasprm": _numbers(bias, 0.0, 0.0)}
+        if bias or stiffness:
+            actuator |= {"biastype": "affine", "biasprm": _numbers(bias, -stiffness, -damping)}
         if "clip" in one:
             actuator |= {"ctrllimited": "true", "ctrlrange": _numbers(*one["clip"])}
         if one.get("lag", 0.0) > 0:
