@@ -164,12 +164,13 @@ def _inertia(known: Mapping[str, float], gain: float) -> float:
 
 @dataclass(frozen=True)
 class JointStart:
-    """Where the joint stands at a row of a record: in rad or m, and per second; where each lag and input stand."""
+    """Where a joint stands at a row of a record: in rad or m, and per second; where its lags and followers stand."""
 
     row: int
     position: float
     velocity: float
     lags: list[float]
+    followers: list[float]  # behind a gap, in units of the input
 
 
 def start_of(subject: Subject, joint: Joint, record: CheckRecord) -> JointStart:
@@ -183,11 +184,15 @@ def start_of(subject: Subject, joint: Joint, record: CheckRecord) -> JointStart:
         writer.start(u, record.y_init, state)
     before = form.form.run_on(u[:row], state)[1]
     now = form.form.run_on(u[row : row + 1], before)[1]
-    lags = []
+    lags, followers = [], []
     for i, channel in enumerate(drives(writer.plant)):
         terms = [t for t in writer.plant.on("input", channel) if t.effect.name in ("actuator_lag", "inner_saturation")]
         first = np.clip(u[0, channel], *joint.inputs[i].get("clip", (-np.inf, np.inf)))
         lags.append(float(before[writer.memory[terms[0]]] if terms and row else first))
+        for term in writer.plant.on("input", channel):
+            if term.effect.name == "backlash":
+                at = float(before[writer.memory[term]])
+                followers.append(at if row else float(u[0, channel]) + 0.5 * joint.inputs[i].get("gap", 0.0) * at)
     z: Float[np.ndarray, " n"] = now[writer.at : writer.at + writer.plant.order] * joint.scale
     position, velocity = (z[0], z[1]) if len(z) == 2 else (0.0, z[0])
-    return JointStart(row, float(position), float(velocity), lags)
+    return JointStart(row, float(position), float(velocity), lags, followers)

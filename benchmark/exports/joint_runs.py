@@ -25,6 +25,7 @@ FILE = "joint.json"
 SUBSTEPS = (16, 64)
 # The difference that passes where the two integrate in steps of their own.
 ROUGH_LIMIT = 1e-2
+GAP_LIMIT = 3e-2  # where a second joint stands for backlash
 STIFF = "0.9999 0.9999 0.001 0.5 2"  # impedance of a constraint that hardly gives way
 
 
@@ -35,6 +36,8 @@ def missing() -> str:
 
 def limit(joint: Joint) -> float:
     """The largest difference that passes as the same free run."""
+    if any(one.get("gap") for one in joint.inputs):
+        return GAP_LIMIT
     return ROUGH_LIMIT if joint.rough else 1e-6
 
 
@@ -100,6 +103,8 @@ def run(
     start, substeps, inputs = joint["starts"][record.name], joint["substeps"], record.u[:, joint["inputs"]]
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = start["position"], start["velocity"]
+    for i, follower in enumerate(start["followers"]):
+        data.qpos[1 + 2 * i] = follower  # the stem in the middle of the gap; it moves to the input at once
     if model.na:
         data.act[:] = [lag for lag, dynamics in zip(start["lags"], model.actuator_dyntype, strict=True) if dynamics]
     row, history = start["row"], 0 if effort else model.nu

@@ -53,6 +53,7 @@ MJCF: dict[str, tuple[str, str, str]] = {
     "inner_saturation": ("actuator dynprm, forcerange", "time constant; J c b (lower, upper limit)", "s; N m or N"),
     "actuator_lag": ("actuator dyntype filter, dynprm", "time constant", "s"),
     "input_delay": ("actuator delay", "delay", "s"),
+    "backlash": ("range of a second joint, of what follows the input", "(-gap / 2, gap / 2)", "unit of the input"),
 }
 URDF: dict[str, tuple[str, str, str]] = {
     "coulomb_friction": ("dynamics friction", "J c friction force", "N m or N"),
@@ -70,7 +71,7 @@ def numbers_of(joint: Joint) -> dict[str, float]:
              "armature": armature(joint)}  # fmt: skip
     named |= {f"gain_{i}": gain for i, gain in enumerate(joint.gains)}
     for i, one in enumerate(joint.inputs):
-        named |= {f"{name}_{i}": one[name] for name in ("lag", "delay") if name in one}
+        named |= {f"{name}_{i}": one[name] for name in ("lag", "delay", "gap") if name in one}
         named |= {f"{name}_{i}": one[name][1] for name in ("clip", "reach") if name in one}
     named |= dict(zip(("lower", "upper"), joint.limits or (), strict=False))
     return named
@@ -120,10 +121,15 @@ def _delay(joint: Joint, p: list[float], channel: int) -> None:
     joint.inputs[channel]["delay"] = p[0]
 
 
+def _gap(joint: Joint, p: list[float], channel: int) -> None:
+    joint.inputs[channel]["gap"] = p[0]
+
+
 CHANGES: dict[str, Callable[[Joint, list[float], int], None]] = {
     "coulomb_friction": _friction, "constant_load": _load, "quadratic_drag": _drag, "gravity": _gravity,
     "quadratic_stiffness": _stiffness(1), "cubic_stiffness": _stiffness(2), "hard_stop": _stop, "actuator_lag": _lag,
     "input_saturation": _clip, "inner_saturation": _inner, "input_delay": _delay,
+    "backlash": _gap,
 }  # fmt: skip
 
 

@@ -5,16 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plants_without_a_fit import DT, grey_box
 
 import simgap
 from simgap.cli import main
 from simgap.data.formats.plant_table import read_forces
 from simgap.data.simulated.rigs import hide
+from simgap.data.splits import assemble
 from simgap.exports import export as exports
 from simgap.exports.export import export
 from simgap.exports.joints import CHANGES, MJCF, URDF, effects_table
-from simgap.records import UnusableInput
-from simgap.registry import EFFECTS
+from simgap.records import Channel, Channels, Experiment, UnusableInput
+from simgap.registry import EFFECTS, MODELS
 from simgap.saved.archive import FittedOn, SavedModel
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -67,6 +69,26 @@ def test_mujoco_moves_the_joint_as_our_simulation(rig, effects, forms, limit, tm
     for form in forms:
         done = export(saved, data, form, tmp_path / form, known=KNOWN)
         assert done.passed and done.limit == limit, str(done)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 4.0])
+def test_a_second_joint_holds_a_command_back_as_backlash_does(stiffness, tmp_path):
+    model = MODELS["greybox"]()
+    model.plants = grey_box("position", [EFFECTS["backlash"]()], [[0.8]]).plants
+    model.plants[0].estimate.theta[1] = stiffness
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.normal(size=30), 5)[:, None]
+    channels = Channels((Channel("u", "V"),), (Channel("x", "deg", "position"),))
+    y_hat = model.simulate(u[None], np.zeros((1, 6, 1)))[0]
+    x = Experiment("run", u, np.concatenate([np.zeros((6, 1)), y_hat]), DT)
+    data = assemble("rig", ((x,), (x,), (x,)), channels, 6, "rig")
+    saved = SavedModel("greybox", model, FittedOn.of(data))
+    done = export(saved, data, "mjcf", tmp_path / "out", known={"mass": "1 kg", "arm": "0.2 m"})
+    assert done.passed and done.limit == 3e-2, str(done)
+    plain = grey_box("position").plants[0]
+    plain.estimate.theta[1] = stiffness
+    without = plain.simulate(u[None], x.y[None, :6])[0]
+    assert np.std(without - y_hat) > 0.1 * np.std(y_hat), "the gap makes no difference"
 
 
 @pytest.mark.slow
