@@ -84,8 +84,8 @@ class Plant(gymnasium.Env):
 '''
 
 HELD = """
-    The inputs {names} keep one value in an episode and are no part of the action: options "held", a list; by default
-    those of the record, and with randomise=True drawn from the range of the data.
+    These inputs keep one value in an episode and are no part of the action: {names}.
+    options "held": their values; by default those of the record, with randomise=True drawn from the range of the data.
 """
 
 refusal = refusal_of_step
