@@ -23,7 +23,8 @@ class StepForm:
     It fills y [ny] from u [nu] and takes the state s [ns] from before sample k to before sample k + 1. All are lists of
     floats. The functions know `math`, `abs min max round`, each other and the `constants` by their names, whose arrays
     they read as flat lists; they hold loops over ranges, branches and assignments, nothing else. `rest` [ns] is the
-    state at rest; `direct` tells whether y(k) depends on u(k) already.
+    state at rest; `direct` tells whether y(k) depends on u(k) already; `held` are inputs that keep one value in a run,
+    such as the mass that a machine carries.
     """
 
     source: str
@@ -32,6 +33,7 @@ class StepForm:
     nu: int
     ny: int
     direct: bool
+    held: tuple[int, ...] = ()
 
     @cached_property
     def functions(self) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ import typer
 from simgap.cli.options import (
     Inputs,
     KindOf,
+    KnownOf,
     Outputs,
     Resample,
     SamplingTime,
@@ -21,19 +21,6 @@ from simgap.cli.options import (
 from simgap.records import UnusableInput
 
 
-def _known(pairs: Sequence[str]) -> dict[str, float]:
-    """["inertia=0.1"] as {"inertia": 0.1}. Raises UnusableInput."""
-    known = parse_params(pairs)
-    for name, value in known.items():
-        if (
-            name not in ("inertia", "torque_constant")
-            or type(value) not in (int, float)
-            or not 0 < value < float("inf")
-        ):
-            raise UnusableInput(f"--plant {name}={value}: give inertia or torque_constant, a positive number")
-    return known
-
-
 def export(
     model: Annotated[str | None, typer.Argument(help="A saved model, or the name of one that is fitted first.")] = None,
     data: Annotated[str | None, typer.Argument(help="Name of a data set, a folder or a CSV file.")] = None,
@@ -41,9 +28,7 @@ def export(
     out: Annotated[Path | None, typer.Option(help="Write into this new folder.")] = None,
     check: Annotated[Path | None, typer.Option("--verify", help="Run the export in this folder once more.")] = None,
     experiment: Annotated[str | None, typer.Option(help="The experiment that becomes the record.")] = None,
-    plant: Annotated[
-        list[str] | None, typer.Option(help="inertia=VALUE or torque_constant=VALUE, for mjcf and urdf; repeatable.")
-    ] = None,
+    known: KnownOf = None,
     into: Annotated[
         Path | None, typer.Option(help="For mjcf: write a copy of this file with the joint in it too.")
     ] = None,
@@ -58,6 +43,7 @@ def export(
     seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
 ) -> None:
     """Write a model as another simulator reads it, run it there, and say how far it is from our free run."""
+    from simgap.data.formats.plant_table import parse_known
     from simgap.exports import export as exports
     from simgap.reports.rendering import printable
 
@@ -71,7 +57,7 @@ def export(
             raise UnusableInput(
                 f"export needs MODEL DATA --to FORMAT --out DIR, FORMAT one of {formats}; or --verify DIR"
             )
-        known = _known(plant or ())
+        table = parse_known(known or ())
         exports.check_target(to, out, into)  # first, because a fit takes its time
         params: dict[str, Any] = {}
         records: Any = data
@@ -79,7 +65,7 @@ def export(
             exports.check_model(model, to)
             records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps).dataset
             params = parse_params(param or ())
-        done = exports.export(model, records, to, out, params, seed, experiment, dt, known, into, joint)
+        done = exports.export(model, records, to, out, params, seed, experiment, dt, table, into, joint)
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

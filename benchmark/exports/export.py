@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from simgap.data import load
+from simgap.data.formats.plant_table import read_forces, with_known
 from simgap.exports import subjects
 from simgap.exports.folders import ABOUT, read_folder, write_folder
 from simgap.exports.subjects import Subject
+from simgap.greybox.model import GreyBoxModel
 from simgap.records import Dataset, Experiment, UnusableInput
 from simgap.running import fitting
 from simgap.saved.archive import FittedOn, SavedModel, read_saved
@@ -43,19 +45,22 @@ class Verification:
 
 def export(
     model: str | Path | SavedModel, data: Any, to: str, out: str | Path, params: dict[str, Any] | None = None,
-    seed: int = 0, experiment: str | None = None, dt: float | None = None, plant: Mapping[str, float] | None = None,
+    seed: int = 0, experiment: str | None = None, dt: float | None = None, known: Mapping[str, Any] | None = None,
     into: str | Path | None = None, joint: str = "",
 ) -> Verification:  # fmt: skip
     """Write a model as another simulator reads it, into a new folder, with records and their expected answers; run it.
 
     `model` is a saved model, or the name of one that is fitted first; `data` what it is fitted on, or records of the
-    same machine; `plant` what is known of it, an inertia or a torque constant for mjcf and urdf; `into` the user's own
-    MJCF, into a copy of which mjcf writes the joint of that name too. The record is the
-    first test experiment, or the one called `experiment`; dt in s, for files without a column of time. Raises
-    UnusableInput where the format does not take such a model, or what runs it is missing.
+    same machine; `known` what is known of it, as a table [plant] says it: a model that is fitted first is fitted with
+    it, a saved one takes its inertia from there, or from a torque constant; `into` the user's own MJCF, into a copy of
+    which mjcf writes the joint of that name too. The record is the first test experiment, or the one called
+    `experiment`; dt in s, for files without a column of time. Raises UnusableInput where the format does not take such
+    a model, or what runs it is missing.
     """
     target, out = check_target(to, out, into), Path(out)
-    subject = replace(_subject(model, data, to, params or {}, seed, experiment, dt), plant=dict(plant or {}))
+    subject = _subject(model, data, to, params or {}, seed, experiment, dt, dict(known or {}))
+    if hasattr(target, "prepare"):
+        subject = target.prepare(subject)
     limit = target.check(subject) if hasattr(target, "check") else subject.limit
     files = {} if into is None else target.patch(subject, Path(into), joint)
     out.mkdir(parents=True, exist_ok=True)
@@ -117,32 +122,36 @@ def _format(name: str) -> Any:
 
 def _subject(
     model: str | Path | SavedModel, data: Any, to: str, params: dict[str, Any], seed: int,
-    experiment: str | None, dt: float | None,
+    experiment: str | None, dt: float | None, known: dict[str, Any],
 ) -> Subject:  # fmt: skip
     if isinstance(model, SavedModel) or is_saved(model):
         saved = model if isinstance(model, SavedModel) else read_saved(model)
         name, fitted, about = saved.name, saved.model, saved.fitted_on
+        if known and isinstance(fitted, GreyBoxModel) and fitted.plants[0].estimate.plant.machine is not None:
+            raise UnusableInput(f"--known: {name} was fitted with its table [plant]; leave it out, or fit again")
+        forces = read_forces(known)
         if reason := refusal(name, type(fitted), to):
             raise UnusableInput(reason)
-        training: tuple[Experiment, ...] = ()
         if isinstance(data, Dataset):
-            x = _record(data, experiment)
+            x, seen = _record(data, experiment), data.training.train + data.training.valid + data.test
         else:
-            x = matching_experiments(about, data, experiment, dt)[0]
+            x, seen = matching_experiments(about, data, experiment, dt)[0], matching_experiments(about, data, dt=dt)
     else:
         check_model(str(model), to)  # first, because data and a fit take their time
-        dataset = data if isinstance(data, Dataset) else load(data, dt=dt)
+        torque_constant = {key: known.pop(key) for key in ("torque_constant",) if key in known}
+        dataset = with_known(data if isinstance(data, Dataset) else load(data, dt=dt), known)
+        forces = read_forces(torque_constant)
         name, about = str(model).rpartition(":")[2], FittedOn.of(dataset)
         fitted = fitting.build(str(model), params)
         x = _record(dataset, experiment)
         fitted.fit(dataset.training, seed)
-        training = dataset.training.train + dataset.training.valid
-    of_u, of_y = subjects.ranges(training or (x,))
+        seen = dataset.training.train + dataset.training.valid
+    of_u, of_y = subjects.ranges(seen)
     records = [
         subjects.measured_record(name, fitted, about, x),
-        subjects.friction_record(fitted, about, abs(of_u).max(axis=0)),
+        subjects.friction_record(fitted, about, abs(of_u).max(axis=0), x),
     ]
-    return Subject(name, fitted, about, tuple(one for one in records if one is not None), of_u, of_y)
+    return Subject(name, fitted, about, tuple(one for one in records if one is not None), of_u, of_y, forces)
 
 
 def _record(data: Dataset, name: str | None) -> Experiment:

@@ -1,230 +1,17 @@
-"""Grey boxes as step forms: the effects' own laws, one substep of each plant, and the text that calls them."""
+"""Grey boxes as step forms: the laws of their effects, and a step of each plant."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.exports import bodies
-from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
-from simgap.greybox.kernels import transition
+from simgap.exports.machines import MachineWriter
+from simgap.exports.writers import Cells, PlantWriter
 from simgap.greybox.model import FittedPlant, GreyBoxModel
-from simgap.greybox.plant import Plant
-from simgap.greybox.simulation import Simulator
-from simgap.greybox.terms import Term
-from simgap.greybox.two_masses import ENTRY
-from simgap.records import UnusableInput
 from simgap.step_form import StepForm, source_of
-
-
-class Cells:
-    """Places in the state, handed out one after the other."""
-
-    def __init__(self, taken: int) -> None:
-        self.taken = taken
-
-    def take(self, count: int) -> int:
-        """Reserve so many places; return the first."""
-        self.taken += count
-        return self.taken - count
-
-
-class PlantWriter:
-    """The step of one fitted plant, and where its numbers stand in the state of the whole model."""
-
-    def __init__(self, fitted: FittedPlant, number: int, cells: Cells, nu: int) -> None:
-        self.fitted, self.name, self.nu = fitted, f"plant{number}", nu
-        self.plant: Plant = fitted.forecasting
-        self.theta = fitted.estimate.theta
-        self.of_theta, self.sub = f"P{number}", self.plant.substeps
-        self.h = self.plant.dt / self.sub
-        if self.plant.machine is not None:
-            raise UnusableInput(
-                "a machine with a table [plant] cannot be exported yet: its controller acts within a step; "
-                "`simgap simulate` runs it"
-            )
-        if self.plant.imposed and self.plant.zeros:
-            raise UnusableInput(
-                "the model reads the rate of the imposed motion from the sample after the present one; a step knows no "
-                "sample to come, and no format takes such a model"
-            )
-        n, flows = self.plant.order, self.plant.order if self.plant.cascade else 1
-        self.count, self.at, self.before = cells.take(1), cells.take(n), cells.take(flows)
-        self.back = 1 - min(self.plant.taps)  # samples of the input before the newest that a substep needs
-        self.arriving = [cells.take((self.back + 1) * self.sub) for _ in range(nu)]
-        self.motion = cells.take(2)  # velocity and direction of an imposed motion
-        self.memory = {term: cells.take(self._cells(term)) for term in self.plant.terms}
-
-    def _cells(self, term: Term) -> int:
-        effect: Any = term.effect
-        if isinstance(effect, ForceEffect):
-            return effect.memory
-        return effect.cells(self.theta[self.plant.part_of(term)], self.h if effect.port == "input" else self.plant.dt)
-
-    def laws(self) -> Iterator[tuple[str, Callable[..., float], tuple[Callable[..., float], ...]]]:
-        """Yield the name, the law and its helpers, of every effect."""
-        for term in self.plant.terms:
-            effect: Any = term.effect
-            yield effect.name, effect.term if isinstance(effect, ForceEffect) else effect.step, effect.helpers
-
-    def constants(self) -> dict[str, np.ndarray]:
-        """Give the parameters, the transition over a substep, and the rows that the outputs read."""
-        plant, n, q = self.plant, self.plant.order, self.name[5:]
-        given = {f"P{q}": self.theta, f"C{q}": plant.reading(self.theta)[: plant.ny, : max(n, 1)]}
-        if n:
-            matrices = np.empty((3, n, n))
-            transition(plant.matrix(self.theta), self.h, *matrices)
-            given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
-            given[f"RATES{q}"] = -np.diag(plant.matrix(self.theta))
-            given[f"SPRING{q}"] = -plant.matrix(self.theta)[ENTRY if plant.joint else n - 1, :1]
-        return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
-
-    def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:
-        """Write the start that suits the first samples into the state, before sample 0."""
-        plant = self.plant
-        local = self.fitted.start(u[None], y_init[None][:, :, list(self.fitted.outputs)])
-        state[self.at : self.at + plant.order] = local[0, : plant.order]
-        for term, value in zip(plant.remembered, local[0, plant.order :], strict=False):
-            state[self.memory[term]] = np.clip(value, -1, 1) if plant.imposed and term.effect.port == "force" else value
-        if plant.imposed and len(u) > 1:
-            x = Simulator(plant, u[None]).arriving(self.theta, 0, local)
-            state[self.motion] = (x[0, 1] - x[0, 0]) / plant.dt
-
-    def text(self) -> str:
-        """Write the functions of this plant, `..._step` the last of them."""
-        parts = [self._input(channel) for channel in range(self.nu)]
-        if self.plant.imposed:
-            return "\n\n\n".join([*parts, self._follow()])
-        return "\n\n\n".join([*parts, self._tanks() if self.plant.cascade else self._body(), self._step()])
-
-    def _input(self, channel: int) -> str:
-        lines = [f"def {self.name}_input{channel}(s: list, u: float, k: int):",
-                 '    """Pass the input through its effects, at substep k."""']  # fmt: skip
-        for term in self.plant.on("input", channel):
-            assert isinstance(term.effect, InputEffect)
-            at, cells = self.plant.part_of(term).start, self.memory[term]
-            lines.append(f"    u = {term.effect.name}(u, {self.of_theta}, {at}, s, {cells}, {self.h!r}, k)")
-        return "\n".join([*lines, "    return u"])
-
-    def _forces(self, role: str, x: str, v: str, h: str) -> list[tuple[Term, str]]:
-        """List the terms of a role with the call of each."""
-        found = [term for term in self.plant.on("force") if term.effect.role == role]
-        at = [(self.plant.part_of(term).start, self.memory[term]) for term in found]
-        calls = [
-            f"{term.effect.name}({x}, {v}, t, {h}, {self.of_theta}, {p}, s, {m})"
-            for term, (p, m) in zip(found, at, strict=True)
-        ]
-        return list(zip(found, calls, strict=True))
-
-    def _frictions(self, x: str, v: str, h: str, load: str) -> list[str]:
-        lines = []
-        for term, call in self._forces("friction", x, v, h):
-            if term.effect.memory:
-                lines.append(f"    s[{self.memory[term]}] = {load}")
-            lines.append(f"    hold += {call}")
-        return lines
-
-    def _body(self) -> str:
-        plant, q, at = self.plant, self.name[5:], self.at
-        n, fast = plant.order, min(1, plant.order - 1)
-        entry = ENTRY if plant.joint else n - 1
-        x, v, h = f"s[{at}]", f"s[{at + fast}]", repr(self.h)
-        spring = f"SPRING{q}[0]" if n > 1 else "0.0"
-        lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
-                 '    """Advance the body by a substep, after so many."""',
-                 f"    new = [0.0] * {n}", f"    t = begun * {h}", "    force = 0.0"]  # fmt: skip
-        lines += [f"    force += {call}" for _, call in self._forces("force", x, v, h)]
-        lines += ["    hold = 0.0", *self._frictions(x, v, h, f"abs(drive + {spring} * {x} - force)")]
-        lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
-        lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, {fast}, drive, force, change, hold)")
-        for term, _ in self._forces("stop", x, v, h):
-            p = plant.part_of(term).start
-            lines.append(f"    stop_body(new, {fast}, {self.of_theta}[{p}], {self.of_theta}[{p + 1}])")
-        return "\n".join([*lines, f"    take(s, {at}, new, {n})", f"    s[{self.before}] = force"])
-
-    def _tanks(self) -> str:
-        plant, q, at, n = self.plant, self.name[5:], self.at, self.plant.order
-        x, h = f"s[{at}]", repr(self.h)
-        last = f"RATES{q}[{n - 1}]"
-        lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
-                 '    """Advance the tanks by a substep, after so many."""',
-                 f"    new = [0.0] * {n}", f"    flow = [0.0] * {n}", f"    t = begun * {h}"]  # fmt: skip
-        lines += [f"    flow[0] += {call}" for _, call in self._forces("force", x, x, h)]
-        for _, call in self._forces("outflow", "level", "0.0", h):
-            lines += [f"    for i in range({n}):", f"        level = s[{at} + i] * RATES{q}[i] / ({last} + 1e-300)",
-                      f"        flow_out(flow, i, {n}, {last} * {call})"]  # fmt: skip
-        lines.append(f"    fill_tanks(s, {at}, new, flow, {self.before}, E{q}, G{q}, R{q}, {n}, drive, begun)")
-        for term, _ in self._forces("rim", x, x, h):
-            rims = ", ".join(f"{self.of_theta}[{plant.part_of(term).start + i}]" for i in range(3))
-            lines.append(f"    spill_tanks(new, {n}, RATES{q}, {rims})")
-        return "\n".join([*lines, f"    take(s, {at}, new, {n})"])
-
-    def _shifted_inputs(self) -> list[str]:
-        """Write: the newest sample of each input arrives, the oldest is forgotten."""
-        kept, lines = self.back * self.sub, []
-        for channel, a in enumerate(self.arriving):
-            lines += [
-                f"    for i in range({kept}):", f"        s[{a} + i] = s[{a + self.sub} + i]",
-                f"    for i in range({self.sub}):",
-                f"        s[{a + kept} + i] = {self.name}_input{channel}(s, u[{channel}], k * {self.sub} + i)",
-                "    if k == 0:", f"        for i in range({kept}):", f"            s[{a} + i] = s[{a + kept}]",
-            ]  # fmt: skip
-        return lines
-
-    def _drive(self, back: int, i: str) -> list[str]:
-        """Write b u + d for substep i of the sample so many before the newest."""
-        layout = self.plant.layout
-        gains = np.arange(layout.gains.start, layout.gains.stop).reshape(self.nu, -1)
-        offset = f"{self.of_theta}[{layout.offset.start}]" if self.plant.offset else "0.0"
-        lines = [f"drive = {offset}"]
-        for a, of_channel in zip(self.arriving, gains, strict=True):
-            for tap, gain in zip(self.plant.taps, of_channel, strict=True):
-                place = a + (self.back - back + tap) * self.sub
-                lines.append(f"drive += {self.of_theta}[{gain}] * s[{place} + {i}]")
-        return lines
-
-    def _step(self) -> str:
-        lines = [f"def {self.name}_step(s: list, u: list, y: list):",
-                 '    """Take the plant from the sample before to this one, and read its sensors."""',
-                 f"    k = int(s[{self.count}])", *self._shifted_inputs(),
-                 "    if k > 0:", f"        for i in range({self.sub}):"]  # fmt: skip
-        lines += [f"            {line}" for line in self._drive(1, "i")]
-        lines.append(f"            {self.name}_substep(s, drive, (k - 1) * {self.sub} + i)")
-        n, q = self.plant.order, self.name[5:]
-        for row, output in enumerate(self.fitted.outputs):
-            lines += [f"    y[{output}] = 0.0", f"    for i in range({n}):",
-                      f"        y[{output}] += C{q}[{row * n} + i] * s[{self.at} + i]"]  # fmt: skip
-        return "\n".join([*lines, *self._sensors(), f"    s[{self.count}] = k + 1"])
-
-    def _sensors(self) -> list[str]:
-        lines = []
-        for row, output in enumerate(self.fitted.outputs):
-            for term in self.plant.on("output", row):
-                assert isinstance(term.effect, OutputEffect)
-                at, cells, dt = self.plant.part_of(term).start, self.memory[term], self.plant.dt
-                lines.append(
-                    f"    y[{output}] = {term.effect.name}(y[{output}], {self.of_theta}, {at}, s, {cells}, {dt!r}, k)"
-                )
-        return lines
-
-    def _follow(self) -> str:
-        """Write the step of an imposed motion: the force that it takes."""
-        newest, v, side, dt = self.arriving[0] + self.back, self.motion, self.motion + 1, self.plant.dt
-        output = self.fitted.outputs[0]
-        lines = [f"def {self.name}_step(s: list, u: list, y: list):", '    """Compute the force of the motion."""',
-                 f"    k = int(s[{self.count}])", f"    t = k * {dt!r}", *self._shifted_inputs(),
-                 f"    h = {dt!r} if k > 0 else 0.0", "    if k > 0:",
-                 f"        s[{v}] = (s[{newest}] - s[{newest - 1}]) / {dt!r}",
-                 f"    if s[{v}] != 0.0:", f"        s[{side}] = 1.0 if s[{v}] > 0.0 else -1.0"]  # fmt: skip
-        lines += [f"    {line}" for line in self._drive(0, "0")] + ["    force = drive"]
-        lines += [f"    force -= {call}" for _, call in self._forces("force", f"s[{newest}]", f"s[{v}]", "h")]
-        for line in self._frictions(f"s[{newest}]", f"s[{v}]", "h", "abs(force)"):
-            lines.append(line.replace("    hold += ", f"    force += s[{side}] * "))
-        return "\n".join([*lines, f"    y[{output}] = force", *self._sensors(), f"    s[{self.count}] = k + 1"])
 
 
 class GreyBoxStep:
@@ -232,7 +19,7 @@ class GreyBoxStep:
 
     def __init__(self, model: GreyBoxModel, nu: int, ny: int) -> None:
         cells = Cells(0)
-        self.writers = [PlantWriter(fitted, number, cells, nu) for number, fitted in enumerate(model.plants)]
+        self.writers = [_writer(fitted)(fitted, number, cells, nu) for number, fitted in enumerate(model.plants)]
         laws: dict[str, str] = {"dry_friction": source_of(bodies.dry_friction)}
         shared = (
             bodies.move_body,
@@ -255,7 +42,8 @@ class GreyBoxStep:
         direct = any(writer.plant.imposed or max(writer.plant.taps) > 0 for writer in self.writers)
         source = _only_used(source)
         constants = {name: value for name, value in constants.items() if re.search(rf"\b{name}\b", source)}
-        self.form = StepForm(source, constants, np.zeros(cells.taken), nu, ny, direct)
+        held = sorted({channel for writer in self.writers for channel in writer.held()})
+        self.form = StepForm(source, constants, np.zeros(cells.taken), nu, ny, direct, tuple(held))
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"]) -> Float[np.ndarray, " ns"]:
         """Return the state before sample n, from the start that suits the first n samples."""
@@ -263,6 +51,10 @@ class GreyBoxStep:
         for writer in self.writers:
             writer.start(u, y_init, state)
         return self.form.run_on(u[: len(y_init)], state)[1]
+
+
+def _writer(fitted: FittedPlant) -> type[PlantWriter]:
+    return PlantWriter if fitted.estimate.plant.machine is None else MachineWriter
 
 
 def _only_used(source: str) -> str:

@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports.folders import About
-from simgap.exports.joints import Joint, numbers_of, start_of
+from simgap.exports.joint_models import drives, start_of
+from simgap.exports.joints import Joint, numbers_of
 from simgap.exports.ranges import spread
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.records import UnusableInput
@@ -24,6 +25,7 @@ FILE = "joint.json"
 SUBSTEPS = (16, 64)
 # The difference that passes where the two integrate in steps of their own.
 ROUGH_LIMIT = 1e-2
+GAP_LIMIT = 3e-2  # where a second joint stands for backlash
 STIFF = "0.9999 0.9999 0.001 0.5 2"  # impedance of a constraint that hardly gives way
 
 
@@ -34,6 +36,8 @@ def missing() -> str:
 
 def limit(joint: Joint) -> float:
     """The largest difference that passes as the same free run."""
+    if any(one.get("gap") for one in joint.inputs):
+        return GAP_LIMIT
     return ROUGH_LIMIT if joint.rough else 1e-6
 
 
@@ -58,7 +62,7 @@ def write(root: ET.Element, file: Path, subject: Subject, joint: Joint, remake: 
     about: dict[str, Any] = {
         "kind": joint.kind, "si_per_unit": joint.scale, "inertia": joint.inertia, "gains": joint.gains,
         "effort": [one.get("clip") for one in joint.inputs], "substeps": SUBSTEPS[joint.rough],
-        "of_velocity": plant.kind == "velocity", "outputs": list(fitted.outputs),
+        "inputs": list(drives(plant)), "of_velocity": plant.kind == "velocity", "outputs": list(fitted.outputs),
         "ranges": {name: list(both) for name, both in ranges.items()},
         "velocity_gain": float(theta[plant.layout.velocity][0]) if plant.two_outputs else 1.0,
         "starts": {record.name: asdict(start_of(subject, joint, record)) for record in subject.records},
@@ -96,9 +100,11 @@ def run(
 ) -> Float[np.ndarray, "N ny"]:
     """Step MuJoCo through a record; `effort`: the inputs become a force on the joint, else they are the controls."""
     mujoco = engine()
-    start, substeps = joint["starts"][record.name], joint["substeps"]
+    start, substeps, inputs = joint["starts"][record.name], joint["substeps"], record.u[:, joint["inputs"]]
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = start["position"], start["velocity"]
+    for i, follower in enumerate(start["followers"]):
+        data.qpos[1 + 2 * i] = follower  # the stem in the middle of the gap; it moves to the input at once
     if model.na:
         data.act[:] = [lag for lag, dynamics in zip(start["lags"], model.actuator_dyntype, strict=True) if dynamics]
     row, history = start["row"], 0 if effort else model.nu
@@ -106,9 +112,9 @@ def run(
         if n := int(model.actuator_history[i][0]):
             times = model.opt.timestep * np.arange(-n, 0)
             rows = row + np.floor(times / about.dt + 1e-9).astype(int)
-            mujoco.mj_initCtrlHistory(model, data, i, times, record.u[np.maximum(rows, 0), i])
+            mujoco.mj_initCtrlHistory(model, data, i, times, inputs[np.maximum(rows, 0), i])
     motion = []
-    for u in record.u[row:]:
+    for u in inputs[row:]:
         motion.append((float(data.qpos[0]), float(data.qvel[0])))
         if effort:
             data.qfrc_applied[0] = force(joint, u)

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from simgap.exports.joint_runs import engine
-from simgap.exports.joints import Joint
+from simgap.exports.joints import Joint, armature
 from simgap.records import UnusableInput
 
 
@@ -64,21 +64,13 @@ class Robot:
 def patched(
     robot: Robot, joint: Joint, attributes: Mapping[str, str], actuators: Sequence[Mapping[str, str]]
 ) -> tuple[str, str]:
-    """Return the patched text and a unified diff; the armature makes up what the bodies lack of the inertia.
+    """Return the patched text and a unified diff; the armature is the inertia that the bodies do not have.
 
     Raises UnusableInput where the joint is of another kind, its bodies are too heavy, or their gravity is their own.
     """
     if joint.kind != robot.kind:
         raise UnusableInput(f"--joint {robot.joint} is a {robot.kind}, the model is one of a {joint.kind}")
-    if joint.swing:
-        raise UnusableInput("--into: the model has gravity of its own, which the bodies in the file bring already")
-    armature = joint.inertia - robot.inertia
-    if armature < 0:
-        raise UnusableInput(
-            f"the bodies at {robot.joint} have {robot.inertia:.4g} kg m^2 or kg, more than the {joint.inertia:.4g} of "
-            f"the model; correct them or --plant"
-        )
-    made = {**attributes, "armature": repr(armature)}
+    made = {**attributes, "armature": repr(_armature(robot, joint))}
     if joint.limits and robot.in_degrees and joint.kind == "hinge":
         made["range"] = " ".join(repr(degrees(end)) for end in joint.limits)
     text = _edited(robot, made)
@@ -86,6 +78,21 @@ def patched(
     names = str(robot.file), f"{robot.file.stem}_patched.xml"
     diff = difflib.unified_diff(robot.text.splitlines(True), text.splitlines(True), *names)
     return text, "".join(diff)
+
+
+def _armature(robot: Robot, joint: Joint) -> float:
+    """What the drive has beside the bodies: known, where the mass that it carried is; else what these lack."""
+    if joint.carried is not None:
+        return armature(joint)
+    if joint.swing:
+        raise UnusableInput("--into: the model has gravity of its own, which the bodies in the file bring already")
+    missing = joint.inertia - robot.inertia
+    if missing < 0:
+        raise UnusableInput(
+            f"the bodies at {robot.joint} have {robot.inertia:.4g} kg m^2 or kg, more than the {joint.inertia:.4g} of "
+            f"the model; correct them or --known"
+        )
+    return missing
 
 
 def _without_comments(text: str) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports.grey_boxes import Cells, GreyBoxStep
+from simgap.exports.grey_boxes import GreyBoxStep
+from simgap.exports.writers import Cells
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.rest import Rest, RestOfOutput
 from simgap.greybox.rest_features import FAR, SHAPES_AT_A_TIME

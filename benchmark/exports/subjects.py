@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from simgap.exports.grey_boxes import GreyBoxStep
 from simgap.exports.rests import GreyBoxWithRest
-from simgap.greybox.model import GreyBoxModel
+from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.simulation import Simulator
 from simgap.protocol import is_stochastic
 from simgap.records import Experiment, UnusableInput
@@ -63,7 +63,7 @@ class Subject:
     records: tuple[CheckRecord, ...]
     input_range: Float[np.ndarray, "2 nu"]  # the least and the largest value of each input
     output_range: Float[np.ndarray, "2 ny"]
-    plant: Mapping[str, float] = field(default_factory=dict)  # what is known of the machine: inertia, torque_constant
+    known: Mapping[str, float] = field(default_factory=dict)  # of a linear plant: inertia, torque_constant
 
     @cached_property
     def form(self) -> StepForm:
@@ -114,18 +114,26 @@ def measured_record(name: str, model: Any, about: FittedOn, x: Experiment) -> Ch
     return CheckRecord("record", x.u, y_init, y_hat, start)
 
 
-def friction_record(model: Any, about: FittedOn, largest: Float[np.ndarray, " nu"]) -> CheckRecord | None:
-    """Make a record from rest that reverses, and then holds below breakaway; None for a model without dry friction."""
+def friction_record(
+    model: Any, about: FittedOn, largest: Float[np.ndarray, " nu"], x: Experiment
+) -> CheckRecord | None:
+    """Make a record from rest that reverses, and then holds below breakaway; None for a model without dry friction.
+
+    A known machine has the columns that x has in the middle, and is enabled.
+    """
     if not isinstance(model, GreyBoxModel):
         return None
-    breakaway = [_breakaway(fitted) for fitted in model.plants]
+    others = usual_inputs(model, x.u)
+    breakaway = [_breakaway(fitted, others) for fitted in model.plants]
     if not any(breakaway):
         return None
     hold = 0.5 * min(filter(None, breakaway))
-    top = max(float(largest[0]), 4 * hold)
+    machine = model.plants[0].forecasting.machine
+    driven = machine.of_drive if machine is not None else 0
+    top = max(float(largest[driven]), 4 * hold)
     corners = (0.0, top, 0.0, -top, 0.0, hold, hold, -hold, -hold, 0.0)
-    u = np.zeros((RAMP * (len(corners) - 1), len(largest)))
-    u[:, 0] = np.interp(np.arange(len(u)) / RAMP, range(len(corners)), corners)
+    u = np.tile(others, (RAMP * (len(corners) - 1), 1))
+    u[:, driven] = np.interp(np.arange(len(u)) / RAMP, range(len(corners)), corners)
     y_hat = np.empty((len(u), len(about.channels.outputs)))
     for fitted in model.plants:
         plant = fitted.forecasting
@@ -135,18 +143,32 @@ def friction_record(model: Any, about: FittedOn, largest: Float[np.ndarray, " nu
     return CheckRecord("reversal", u, y_hat[:0], y_hat, form.rest)
 
 
-def _breakaway(fitted: Any) -> float:
-    """Return the size of the first input that dry friction just holds at rest; 0 where there is none."""
+def usual_inputs(model: GreyBoxModel, u: Float[np.ndarray, "T nu"]) -> Float[np.ndarray, " nu"]:
+    """Return the inputs beside the one that moves: the middle of a machine's columns, enabled, else zero."""
+    machine = model.plants[0].forecasting.machine
+    if machine is None:
+        return np.zeros(u.shape[1])
+    usual = np.median(u, axis=0)
+    if machine.known.enabled:
+        usual[machine.names.index(machine.known.enabled)] = 1.0
+    return usual
+
+
+def _breakaway(fitted: FittedPlant, others: Float[np.ndarray, " nu"]) -> float:
+    """Return the size of the first input, or of a goal, that dry friction just holds at rest; 0 without friction."""
     plant, theta = fitted.forecasting, fitted.estimate.theta
-    gain = abs(float(np.sum(theta[plant.layout.gains].reshape(plant.nu, -1)[0])))
     frictions = [term for term in plant.on("force") if term.effect.role == "friction"]
-    if plant.imposed or not frictions or not gain:
+    if plant.imposed or not frictions:
         return 0.0
+    gain = abs(float(np.sum(theta[plant.layout.gains].reshape(-1, len(plant.taps))[0])))
+    if (machine := plant.machine) is not None:
+        known, row = machine.known, others[None, None]
+        gain *= machine.column(row, known.supply, 1.0)[0, 0]
+        gain *= machine.column(row, known.gain, 1.0)[0, 0] * known.goal_factor if machine.controlled else 1.0
     nothing = np.zeros(4)
-    holds = [
-        term.effect.term(0.0, 0.0, 0.0, plant.dt, theta, plant.part_of(term).start, nothing, 0) for term in frictions
-    ]
-    return float(sum(holds)) / gain
+    effects: list[tuple[Any, int]] = [(term.effect, plant.part_of(term).start) for term in frictions]
+    holds = [effect.term(0.0, 0.0, 0.0, plant.dt, theta, at, nothing, 0) for effect, at in effects]
+    return float(sum(holds)) / gain if gain else 0.0
 
 
 def ranges(experiments: Sequence[Experiment]) -> tuple[Float[np.ndarray, "2 nu"], Float[np.ndarray, "2 ny"]]:

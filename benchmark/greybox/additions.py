@@ -21,12 +21,13 @@ from simgap.greybox.unfolding import unfolded
 # Score tests below this log-likelihood ratio are not worth a refit.
 WORTH_A_REFIT = 2.0
 FIRST_STEPS = 8  # of a fit from each of many starts
+FASTER = (1.0, 5.0, 25.0)  # gains of a loop whose command may be limited, beside that of the loop without a limit
 STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 # Steps of a fit until the candidates are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
 FINALISTS = 8
 PROMISING = 8  # effects of a known machine that are fitted at all
-FINALISTS_OF_MACHINE = 3
+FINALISTS_OF_MACHINE = 5
 MORE_STEPS = 8  # until they are compared again
 
 # The models with one effect more than those of the key, and whether only linear effects were asked for.
@@ -147,6 +148,9 @@ def extend(
     if plant.machine is not None and term.effect.role == "friction":
         # The damping stood in for it, and no descent leads from much of the one to much of the other.
         begun = begun[:1] + _without_damping(baseline, estimate, plant, term)
+    if plant.machine is not None and term.effect.port == "input" and term.channel == plant.nu:
+        # A slow loop stood in for a fast one whose command is limited.
+        begun = begun[:1] + _in_faster_loops(baseline, estimate, plant, term)
     return baseline.fit(plant.terms, begun, max_steps)
 
 
@@ -160,6 +164,19 @@ def _without_damping(
         descend(problem, plant.machine.less_damped(theta), local, damping, FIRST_STEPS, TOLERANCE)
         for theta, local in started(estimate, plant, term)
     ]
+    fits.sort(key=lambda fit: fit.squares)
+    return [(fit.theta, fit.local) for fit in fits[:STARTS]]
+
+
+def _in_faster_loops(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Begin a limit of the command from each of its starts, with the gain as it is and larger; return the best ones."""
+    problem, gain, fits = baseline.problem(plant), plant.layout.gains.start, []
+    for theta, local in started(estimate, plant, term):
+        for factor in FASTER:
+            theta[gain] = np.clip(factor * estimate.theta[gain], plant.low[gain], plant.high[gain])
+            fits.append(descend(problem, theta.copy(), local, None, FIRST_STEPS, TOLERANCE))
     fits.sort(key=lambda fit: fit.squares)
     return [(fit.theta, fit.local) for fit in fits[:STARTS]]
 

@@ -23,10 +23,11 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
     loop, goal, gain, supply, enabled, inertias, weights, numbers, start, substeps, h,
     terms, until, theta, p_at, m_at, memory, commands, c_at, n_commands, states,
 ):  # fmt: skip
-    """Fill states [E, T, n], (q, q') or (q'), from start [E, n]: the equation of `Machine`, semi-implicit in q'.
+    """Fill states [E, T, n], (q, q') or (q'), from start [E, n]: the equation of `Machine`, by the leapfrog method.
 
     goal [E, T * substeps] is r, or the drive; gain, supply (times the drive's gain) and enabled [E, T]. numbers:
     damping, back-EMF, derivative, stiffness, radian, q0. Commands pass their terms in order, term(c, r - q, ..).
+    Forces act at the position in the middle of a substep, damping acts exactly (Hairer, Lubich, Wanner 2003, 1.5).
     Dry friction is an impulse that brings the velocity nearest to zero, as in `run_body`.
     """
     damping, back_emf, derivative, stiffness, radian, rest = numbers
@@ -46,11 +47,13 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                 break
             on = enabled[experiment, k]
             d = damping + back_emf * on
-            scale = h / (inertia + h * d)  # what a unit of force adds to the velocity in a substep
+            # What a unit of force adds to the velocity in a substep, while damping takes it away again.
+            scale = -math.expm1(-h * d / (inertia + 1e-300)) / d if d > 0.0 else h / (inertia + 1e-300)
             for _ in range(substeps):
-                x = q if n > 1 else v
+                middle = q + 0.5 * h * v
+                x = middle if n > 1 else v
                 t = step * h
-                error = goal[experiment, step] - q
+                error = goal[experiment, step] - middle
                 command = goal[experiment, step]
                 if loop:
                     command = gain[experiment, k] * error - derivative * v

@@ -136,6 +136,22 @@ def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
     return replace(dataset, training=replace(training, channels=channels), channels=channels)
 
 
+def read_forces(table: Mapping[str, Any], where: str = "--known") -> dict[str, float]:
+    """Read what gives a linear model its forces: {"inertia": kg m^2 or kg} and, or, {"torque_constant": N m or N}.
+
+    inertia + mass arm^2, or inertia + mass without an arm. Raises UnusableInput.
+    """
+    _check_table(table, ("inertia", "mass", "arm", "torque_constant"), where)
+    if "arm" in table and "mass" not in table:
+        raise UnusableInput(f"{where}: arm needs the mass that it carries; add mass, or give inertia")
+    read = {key: _quantity(value, key, key, where) for key, value in table.items() if key != "torque_constant"}
+    inertia = read.get("inertia", 0.0) + read.get("mass", 0.0) * read.get("arm", 1.0) ** 2
+    forces = {"inertia": inertia} if inertia else {}
+    if "torque_constant" in table:
+        forces["torque_constant"] = _quantity(table["torque_constant"], "gain", "torque_constant", where)
+    return forces
+
+
 def parse_known(options: Sequence[str], where: str = "--known") -> dict[str, Any]:
     """Turn `mass=0.5kg`, `controller.goal=r` or `arm=0.1..0.12m` into a table. Raises UnusableInput."""
     table: dict[str, Any] = {}

@@ -5,15 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plants_without_a_fit import DT, grey_box
 
 import simgap
 from simgap.cli import main
+from simgap.data.formats.plant_table import read_forces
 from simgap.data.simulated.rigs import hide
+from simgap.data.splits import assemble
 from simgap.exports import export as exports
 from simgap.exports.export import export
 from simgap.exports.joints import CHANGES, MJCF, URDF, effects_table
-from simgap.records import UnusableInput
-from simgap.registry import EFFECTS
+from simgap.records import Channel, Channels, Experiment, UnusableInput
+from simgap.registry import EFFECTS, MODELS
 from simgap.saved.archive import FittedOn, SavedModel
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -64,27 +67,47 @@ def test_the_tables_name_effects_and_the_readme_shows_them():
 def test_mujoco_moves_the_joint_as_our_simulation(rig, effects, forms, limit, tmp_path):
     saved, data = fitted(rig, *effects)
     for form in forms:
-        done = export(saved, data, form, tmp_path / form, plant=KNOWN)
+        done = export(saved, data, form, tmp_path / form, known=KNOWN)
         assert done.passed and done.limit == limit, str(done)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 4.0])
+def test_a_second_joint_holds_a_command_back_as_backlash_does(stiffness, tmp_path):
+    model = MODELS["greybox"]()
+    model.plants = grey_box("position", [EFFECTS["backlash"]()], [[0.8]]).plants
+    model.plants[0].estimate.theta[1] = stiffness
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.normal(size=30), 5)[:, None]
+    channels = Channels((Channel("u", "V"),), (Channel("x", "deg", "position"),))
+    y_hat = model.simulate(u[None], np.zeros((1, 6, 1)))[0]
+    x = Experiment("run", u, np.concatenate([np.zeros((6, 1)), y_hat]), DT)
+    data = assemble("rig", ((x,), (x,), (x,)), channels, 6, "rig")
+    saved = SavedModel("greybox", model, FittedOn.of(data))
+    done = export(saved, data, "mjcf", tmp_path / "out", known={"mass": "1 kg", "arm": "0.2 m"})
+    assert done.passed and done.limit == 3e-2, str(done)
+    plain = grey_box("position").plants[0]
+    plain.estimate.theta[1] = stiffness
+    without = plain.simulate(u[None], x.y[None, :6])[0]
+    assert np.std(without - y_hat) > 0.1 * np.std(y_hat), "the gap makes no difference"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", [name for name in MJCF if name not in ("gravity", "input_saturation")])
 def test_every_effect_of_the_table_moves_it_so(effect, tmp_path):
     saved, data = fitted("stage", effect)
-    assert export(saved, data, "mjcf", tmp_path / "out", plant=KNOWN).passed
+    assert export(saved, data, "mjcf", tmp_path / "out", known=KNOWN).passed
 
 
 def test_a_torque_constant_tells_the_inertia(cart, tmp_path):
     saved, data = cart
-    export(saved, data, "urdf", tmp_path / "out", plant={"torque_constant": 0.3})
+    export(saved, data, "urdf", tmp_path / "out", known={"torque_constant": 0.3})
     mass = float(ET.parse(tmp_path / "out" / "model.urdf").find(".//mass").get("value"))
     plant = saved.model.plants[0].estimate
     np.testing.assert_allclose(mass * plant.theta[plant.plant.layout.gains], 0.3)
 
 
 @pytest.mark.parametrize(
-    ("rig", "effects", "form", "plant", "sentence"),
+    ("rig", "effects", "form", "known", "sentence"),
     [
         ("cart", (), "mjcf", {}, "forces need the inertia of the joint"),
         ("stage", (), "urdf", KNOWN, "cannot hold a spring"),
@@ -92,10 +115,10 @@ def test_a_torque_constant_tells_the_inertia(cart, tmp_path):
         ("tank", (), "mjcf", KNOWN, "takes a rigid joint"),
     ],
 )
-def test_what_it_cannot_hold_is_said(rig, effects, form, plant, sentence, tmp_path):
+def test_what_it_cannot_hold_is_said(rig, effects, form, known, sentence, tmp_path):
     saved, data = fitted(rig, *effects)
     with pytest.raises(UnusableInput, match=sentence):
-        export(saved, data, form, tmp_path / "out", plant=plant)
+        export(saved, data, form, tmp_path / "out", known=known)
     assert not (tmp_path / "out").exists()
 
 
@@ -103,7 +126,7 @@ def test_the_joint_goes_into_the_users_file_and_nothing_else_changes(cart, tmp_p
     saved, data = cart
     (tmp_path / "robot.xml").write_text(ROBOT)
     into = {"into": tmp_path / "robot.xml", "joint": "rail"}
-    export(saved, data, "mjcf", tmp_path / "out", plant=KNOWN, **into)
+    export(saved, data, "mjcf", tmp_path / "out", known=KNOWN, **into)
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "robot_patched.xml"))
     alone = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "model.xml"))
     assert model.joint("rail").damping == alone.joint("joint").damping
@@ -123,14 +146,22 @@ def test_a_file_that_does_not_fit_is_refused(cart, joint, inertia, sentence, tmp
     (tmp_path / "robot.xml").write_text(ROBOT)
     with pytest.raises(UnusableInput, match=sentence):
         export(
-            saved, data, "mjcf", tmp_path / "out", plant={"inertia": inertia}, into=tmp_path / "robot.xml", joint=joint
+            saved, data, "mjcf", tmp_path / "out", known={"inertia": inertia}, into=tmp_path / "robot.xml", joint=joint
         )
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_known_of_the_machine_is_a_positive_number(tmp_path, capsys):
-    for text in ("inertia=-1", "inertia=x", "mass=1"):
-        assert (
-            main(["export", "greybox", "x.csv", "--to", "mjcf", "--out", str(tmp_path / "new"), "--plant", text]) == 2
-        )
-        assert "a positive number" in capsys.readouterr().err
+def test_a_mass_on_an_arm_tells_the_inertia_and_units_are_converted():
+    assert read_forces({"mass": "500 g", "arm": "20 cm", "inertia": 0.01}) == {"inertia": pytest.approx(0.03)}
+    assert read_forces({"mass": "2 kg"}) == {"inertia": 2.0}
+    assert read_forces({}) == {}
+
+
+def test_what_is_known_of_a_saved_model_is_a_positive_number(cart, tmp_path, capsys):
+    saved, data = cart
+    simgap.save_model(saved.model, tmp_path / "cart.simgap", data)
+    simgap.save(data, tmp_path / "cart")
+    for text in ("inertia=-1", "inertia=x", "volume=1", "arm=0.1"):
+        arguments = [str(tmp_path / "cart.simgap"), str(tmp_path / "cart"), "--to", "mjcf", "--known", text]
+        assert main(["export", *arguments, "--out", str(tmp_path / "new")]) == 2
+        assert capsys.readouterr().err.startswith("simgap: --known")

@@ -73,7 +73,7 @@ def test_drawn_models_keep_the_correlations_of_their_parameters(cart):
 def test_every_export_carries_the_ranges(cart, tmp_path, form):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     _, saved, data = cart
-    export(saved, data, form, tmp_path / "out", plant={"inertia": 0.3})
+    export(saved, data, form, tmp_path / "out", known={"inertia": 0.3})
     written = json.loads((tmp_path / "out" / "export.json").read_text())["ranges"]
     assert [one["parameter"] for one in written] == ["damping over inertia", "gain of force", "friction force"]
     assert [one["part"] for one in written] == ["linear part", "linear part", "coulomb_friction"]

@@ -7,6 +7,7 @@ import pytest
 
 from simgap.data.formats.plant_table import read_plant
 from simgap.data.simulated.rigs import hide, physical
+from simgap.data.simulated.rigs.plants import RIGS
 from simgap.diagnosis.diagnose import diagnose
 from simgap.greybox.additions import extend
 from simgap.greybox.machine import INERTIA, NAMES
@@ -148,6 +149,16 @@ def test_a_torque_that_folds_back_at_large_errors_is_named_with_its_size(strengt
     error, lost = answer.causes[0].parameters
     assert error.value == pytest.approx(physical("servo", {"torque_foldback": strength})["torque_foldback"], rel=0.05)
     assert lost.value == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize(("strength", "seed"), [(1.0, 1), (0.5, 4)])
+def test_the_loop_behind_a_fold_back_has_its_true_gain_and_damping(strength, seed):
+    data = hide("servo", {"torque_foldback": strength}, noise=0.02, seed=seed)
+    baseline = find_machine_baseline(data.training.train, data.training.valid, data.channels, (0,), data.n_init)
+    fit = extend(baseline, baseline.estimate, Term(EFFECTS["torque_foldback"](), baseline.plant.nu))
+    found = dict(zip((*NAMES, "gain"), fit.theta, strict=False))
+    assert found["gain"] == pytest.approx(RIGS["servo"].gain, rel=0.01)
+    assert found["damping"] == pytest.approx(RIGS["servo"].damping, rel=0.01)
 
 
 def test_nothing_is_named_on_a_servo_that_hides_nothing():

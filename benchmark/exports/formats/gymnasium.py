@@ -15,7 +15,7 @@ from simgap.exports.formats import python
 from simgap.exports.formats.control import imported
 from simgap.exports.ranges import variants
 from simgap.exports.subjects import CheckRecord, Subject, refusal_of_step
-from simgap.exports.texts import numbers
+from simgap.exports.texts import numbers, plain
 
 FILE = "environment.py"
 IMPORTS = "import gymnasium\nimport numpy as np\n"
@@ -31,13 +31,14 @@ class Plant(gymnasium.Env):
 
     With randomise=True every episode has a plant of its own, drawn from VARIANTS: the parameters as a repeat of the
     experiments would find them. options "variant": its number, or None for the model that was fitted.
-    """
+{held}    """
 
     metadata = {{"render_modes": [], "render_fps": max(1, round(1 / DT))}}
 
     def __init__(self, horizon=500, render_mode=None, randomise=False):
         self.horizon, self.render_mode, self.randomise, self.numbers = horizon, render_mode, randomise, FITTED
-        self.action_space = gymnasium.spaces.Box(np.array(LOWEST_INPUT), np.array(LARGEST_INPUT), dtype=np.float64)
+        ends = np.array([LOWEST_INPUT, LARGEST_INPUT])[:, ACTING]
+        self.action_space = gymnasium.spaces.Box(*ends, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (2 * len(OUTPUTS),), dtype=np.float64)
 
     def reset(self, *, seed=None, options=None):
@@ -48,14 +49,18 @@ class Plant(gymnasium.Env):
         drawn = int(self.np_random.integers(len(VARIANTS))) if self.randomise and VARIANTS else None
         variant = options.get("variant", drawn)
         self.numbers = FITTED if variant is None else VARIANTS[variant]
+        held = [OF_RECORD[i] for i in HELD]
+        if self.randomise and HELD:
+            held = [self.np_random.uniform(LOWEST_INPUT[i], LARGEST_INPUT[i]) for i in HELD]
+        self.held = options.get("held", held)
         self.state, self.samples = list(options.get("start", REST)), 0
         middle = np.clip(0.0, self.action_space.low, self.action_space.high)
         return self._observation(self._outputs(middle)), {{}}
 
     def step(self, action):
-        inputs, outputs = [float(value) for value in action], [0.0] * len(OUTPUTS)
+        outputs = [0.0] * len(OUTPUTS)
         globals().update(self.numbers)
-        step(self.state, inputs, outputs)
+        step(self.state, self._inputs(action), outputs)
         y = np.array(outputs) if DIRECT else self._outputs(action)
         self.samples += 1
         span = np.array(LARGEST_OUTPUT) - np.array(LOWEST_OUTPUT)
@@ -66,12 +71,22 @@ class Plant(gymnasium.Env):
         """Read the outputs at the present sample; the state stays."""
         outputs = [0.0] * len(OUTPUTS)
         globals().update(self.numbers)
-        step(list(self.state), [float(value) for value in action], outputs)
+        step(list(self.state), self._inputs(action), outputs)
         return np.array(outputs)
+
+    def _inputs(self, action):
+        """Put what acts beside what the episode holds."""
+        inputs = dict(zip(ACTING + HELD, [*action, *self.held]))
+        return [float(inputs[i]) for i in range(len(INPUTS))]
 
     def _observation(self, y):
         return np.concatenate((y, self.target))
 '''
+
+HELD = """
+    These inputs keep one value in an episode and are no part of the action: {names}.
+    options "held": their values; by default those of the record, with randomise=True drawn from the range of the data.
+"""
 
 refusal = refusal_of_step
 
@@ -90,8 +105,13 @@ def write(subject: Subject, folder: Path) -> None:
     lines += f"FITTED = {{{', '.join(f'{name!r}: {name}' for name in form.constants)}}}\n"
     lines += f"VARIANTS = [{''.join(_variant(one) for one in variants(subject))}]\n"
     when = ", which it changes at once" if form.direct else ", at the next sample"
+    held, of_record = list(form.held), subject.records[0].u[0]
+    lines += f"HELD = {held}  # of the inputs: those that an episode holds\n"
+    lines += f"ACTING = {[i for i in range(form.nu) if i not in held]}\nOF_RECORD = [{numbers(of_record)}]\n"
+    names = ", ".join(subject.fitted_on.channels.inputs[i].name for i in held)
+    about_held = HELD.format(names=plain(names)) if held else ""
     texts = python.parts(subject, IMPORTS), f"DIRECT = {form.direct}\n", lines, "\n\n", form.source
-    (folder / FILE).write_text("".join(texts) + ENVIRONMENT.format(when=when), encoding="utf-8")
+    (folder / FILE).write_text("".join(texts) + ENVIRONMENT.format(when=when, held=about_held), encoding="utf-8")
 
 
 def _variant(constants: Mapping[str, np.ndarray]) -> str:
@@ -108,6 +128,7 @@ def run(folder: Path, about: About, record: CheckRecord) -> Float[np.ndarray, "N
         warnings.simplefilter("ignore")  # of an observation space without bounds, say
         check_env(module.Plant(), skip_render_check=True)
     environment, ny = module.Plant(horizon=len(record.u)), record.y_hat.shape[1]
-    first, _ = environment.reset(seed=0, options={"start": record.start.tolist()})
-    rows = [first, *(environment.step(u)[0] for u in record.u[record.n :])]
+    held = record.u[0, module.HELD].tolist()
+    first, _ = environment.reset(seed=0, options={"start": record.start.tolist(), "held": held})
+    rows = [first, *(environment.step(u)[0] for u in record.u[record.n :, module.ACTING])]
     return np.array(rows)[1:, :ny] if module.DIRECT else np.array(rows)[:-1, :ny]

@@ -9,21 +9,26 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports import joint_runs, joints
+from simgap.exports import joint_models, joint_runs
 from simgap.exports.folders import About, file_in
+from simgap.exports.gaps import add_gap, gaps_of
+from simgap.exports.joint_models import joint_of
 from simgap.exports.joint_runs import STIFF
-from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, body, joint_of
+from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, armature, body
 from simgap.exports.patching import Robot, patched
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
+from simgap.records import UnusableInput
 
 FILE = "model.xml"
-refusal, missing = joints.refusal, joint_runs.missing
+refusal, missing, prepare = joint_models.refusal, joint_runs.missing, joint_models.steady
 
 
 def check(subject: Subject) -> float:
     """Return the limit of the difference. Raises UnusableInput for what MuJoCo cannot hold."""
-    return joint_runs.limit(joint_of(subject, MJCF, "mjcf"))
+    joint = joint_of(subject, MJCF, "mjcf")
+    gaps_of(subject, joint)
+    return joint_runs.limit(joint)
 
 
 def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
@@ -32,6 +37,8 @@ def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
         "damping": _series(joint.damping, joint.drag),
         "stiffness": _series(joint.stiffness, *joint.stiffness_by_position),
     }
+    if joint.carried is not None:
+        made["armature"] = repr(armature(joint))
     soft = f"{2 * step!r} 1"
     if joint.frictionloss:
         made |= {"frictionloss": repr(joint.frictionloss), "solimpfriction": STIFF, "solreffriction": soft}
@@ -44,10 +51,10 @@ def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
     """The attributes of <general>, one for each input; a constant load goes with the first one."""
     made = []
     for i, (gain, one) in enumerate(zip(joint.gains, joint.inputs, strict=True)):
-        bias = joint.bias if i == 0 else 0.0
+        bias, (stiffness, damping) = (joint.bias, joint.holds) if i == 0 else (0.0, (0.0, 0.0))
         actuator = {"name": f"{name}_input{i}", "joint": name, "gainprm": repr(gain)}
-        if bias:
-            actuator |= {"biastype": "affine", "biasprm": _numbers(bias, 0.0, 0.0)}
+        if bias or stiffness:
+            actuator |= {"biastype": "affine", "biasprm": _numbers(bias, -stiffness, -damping)}
         if "clip" in one:
             actuator |= {"ctrllimited": "true", "ctrlrange": _numbers(*one["clip"])}
         if one.get("lag", 0.0) > 0:
@@ -64,6 +71,8 @@ def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
 def patch(subject: Subject, file: Path, name: str) -> dict[str, str]:
     """Put the joint into the user's XML: the file and patch.diff, by their names. Raises UnusableInput."""
     joint, robot = joint_of(subject, MJCF, "mjcf"), Robot.read(file, name)
+    if any(one.get("gap") for one in joint.inputs):
+        raise UnusableInput("--into: backlash needs bodies of its own; take them from model.xml, without --into")
     made = joint_attributes(joint, robot.timestep), actuators(joint, name, robot.timestep)
     text, diff = patched(robot, joint, *made)
     return {f"{file.stem}_patched.xml": text, "patch.diff": diff}
@@ -71,7 +80,7 @@ def patch(subject: Subject, file: Path, name: str) -> dict[str, str]:
 
 def write(subject: Subject, folder: Path) -> None:
     """Write model.xml and joint.json."""
-    joint = joint_of(subject, MJCF, "mjcf")
+    gaps, joint = gaps_of(subject, joint_of(subject, MJCF, "mjcf"))
     step = joint_runs.timestep(subject, joint)
     root = ET.Element("mujoco", model=subject.name)
     root.append(ET.Comment(f" {heading(subject).replace('--', '-')} "))
@@ -88,7 +97,10 @@ def write(subject: Subject, folder: Path) -> None:
     axis = "0 1 0" if joint.kind == "hinge" else "1 0 0"
     ET.SubElement(link, "joint", {"name": "joint", "type": joint.kind, "axis": axis} | joint_attributes(joint, step))
     section = ET.SubElement(root, "actuator")
-    for actuator in actuators(joint, "joint", step):
+    made = actuators(joint, "joint", step)
+    for gap in gaps:
+        made[gap.channel] |= add_gap(root, gap, step)
+    for actuator in made:
         ET.SubElement(section, "general", actuator)
     joint_runs.write(root, folder / FILE, subject, joint, lambda one: joint_of(one, MJCF, "mjcf"))
 

@@ -8,22 +8,24 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from simgap.exports import joint_runs, joints
+from simgap.exports import joint_models, joint_runs
 from simgap.exports.folders import About, file_in
+from simgap.exports.joint_models import joint_of
 from simgap.exports.joint_runs import engine
-from simgap.exports.joints import CANNOT, URDF, Joint, body, joint_of
+from simgap.exports.joints import CANNOT, URDF, Joint, body
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
 from simgap.records import UnusableInput
 
 FILE = "model.urdf"
-refusal, missing = joints.refusal, joint_runs.missing
+refusal, missing, prepare = joint_models.refusal, joint_runs.missing, joint_models.steady
 FAR = 1e6  # limits that a URDF asks for where the model has none
 
 
 def _joint(subject: Subject) -> Joint:
     joint = joint_of(subject, URDF, "urdf")
-    for name, value in (("a spring at the joint", joint.stiffness), ("a constant load", joint.bias)):
+    springs = {"a spring at the joint": joint.stiffness, "a constant load": joint.bias, "a controller": joint.holds[0]}
+    for name, value in springs.items():
         if value:
             raise UnusableInput(f"urdf cannot hold {name}: {CANNOT}; --to mjcf can")
     return joint
@@ -40,6 +42,7 @@ def write(subject: Subject, folder: Path) -> None:
     root = ET.Element("robot", name=subject.name)
     root.append(ET.Comment(f" {heading(subject).replace('--', '-')} "))
     ET.SubElement(root, "link", name="base")
+    joint.carried = None  # a URDF has no inertia of a drive, so that the body has all of it
     mass, centre, about_centre = body(joint)
     inertial = ET.SubElement(ET.SubElement(root, "link", name="link"), "inertial")
     ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, centre)))
