@@ -1,4 +1,4 @@
-"""README.md does what it says: its blocks are run in a folder with the files that it names.
+"""README.md and the pages of docs/ do what they say: their blocks are run in a folder with the files that they name.
 
 A comment above a block says what the block is: `<!-- file NAME -->` is the content of a file, `<!-- not run -->` is for
 make, which would run these tests again. Other blocks of sh and python are run as they stand.
@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from simgap.registry import MODELS
+
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(
     r"(?:^<!-- (?P<mark>[^\n]*) -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
@@ -27,12 +29,13 @@ class Block(NamedTuple):
     text: str
 
 
-BLOCKS = [Block(*match.groups()) for match in BLOCK.finditer((ROOT / "README.md").read_text(encoding="utf-8"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCKS = [Block(*match.groups()) for page in PAGES for match in BLOCK.finditer(page.read_text(encoding="utf-8"))]
 FILES = {mark.removeprefix("file "): text for mark, _, text in BLOCKS if mark and mark.startswith("file ")}
 
 
 def to_run(language: str) -> list[str]:
-    return [text for mark, found, text in BLOCKS if found == language and mark is None]
+    return list(dict.fromkeys(text for mark, found, text in BLOCKS if found == language and mark is None))
 
 
 def write_record(path: Path, output: str, seed: int, samples: int = 300) -> None:
@@ -61,7 +64,7 @@ def write_simulated_record(path: Path, samples: int = 1200) -> None:
 
 @pytest.fixture
 def folder(tmp_path):
-    """The reader's folder: three CSV files, a folder of experiments, and every file that the README shows."""
+    """The reader's folder: three CSV files, a folder of experiments, and every file that a page shows."""
     write_record(tmp_path / "my.csv", "y", 0, 600)
     write_record(tmp_path / "new.csv", "y", 1)
     write_simulated_record(tmp_path / "log.csv")
@@ -84,12 +87,12 @@ def run(folder: Path, *command: str) -> str:
 
 
 @pytest.mark.parametrize("script", [text for text in to_run("sh") if "--save arm.simgap" not in text])  # below
-def test_its_commands_run(script, folder):
+def test_the_commands_run(script, folder):
     assert run(folder, "bash", "-euo", "pipefail", "-c", script)
 
 
 @pytest.mark.parametrize("script", to_run("python"))
-def test_its_python_runs(script, folder):
+def test_the_python_runs(script, folder):
     assert "# Leaderboard" in run(folder, sys.executable, "-W", "error", "-c", script)
 
 
@@ -116,10 +119,28 @@ def test_its_model_in_baselines_is_registered_by_that_one_file(folder):
 def test_what_is_not_run_is_make():
     lines = [line for mark, _, text in BLOCKS if mark == "not run" for line in text.splitlines()]
     assert lines
-    assert all(line.startswith("make ") for line in lines)
+    assert all(line.startswith("make ") or line == "source .venv/bin/activate" for line in lines)
 
 
-@pytest.mark.parametrize("page", sorted(ROOT.glob("**/README.md")), ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_leads_to_a_file(page):
+    links = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
+    assert all((page.parent / link).is_file() for link in links if "://" not in link), links
+
+
+def test_every_page_is_linked_from_the_readme():
+    text = PAGES[0].read_text(encoding="utf-8")
+    assert all(f"docs/{page.name}" in text for page in PAGES[1:])
+
+
+def test_every_model_stands_in_the_table_that_says_when_to_use_it():
+    text = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
+    assert not [name for name in MODELS if f"`{name}`" not in text]
+
+
+@pytest.mark.parametrize(
+    "page", [*PAGES, *sorted(ROOT.glob("*/**/README.md"))], ids=lambda page: str(page.relative_to(ROOT))
+)
 def test_every_make_target_it_names_exists(page):
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     named = re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(encoding="utf-8"), re.MULTILINE)

@@ -132,7 +132,7 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
             before = of_order.get(False) if zeros else smaller.get(False) if order > 2 else None
             fits = [fit_plain(plant, train, before)]
             if zeros and order > 2:  # a slow pole beside its zero is found in no model without zeros
-                fits.append(fit_plain(plant, train, smaller[True]))
+                fits += _of_the_input(fit_plain(plant, train, smaller[True]), train)
             of_order[zeros > 0] = min(fits, key=lambda fit: float(np.sum(fit.errors**2)))
         here = [(fit, block_errors(fit, valid, n_init)) for fit in of_order.values()]
         if order > USUAL and not _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train):
@@ -154,6 +154,12 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
         if worse.mean() <= worse.std() / math.sqrt(len(worse)):
             break
     return chosen
+
+
+def _of_the_input(fit: Estimate, train: Records) -> list[Estimate]:
+    """Keep a model whose poles all act within a record; a slower one beside its zero is an offset of each record."""
+    poles = np.linalg.eigvals(fit.plant.matrix(fit.theta))
+    return [fit] if np.min(np.abs(poles)) * train.duration > 1 else []
 
 
 def _likelier(larger: Sequence[Estimate], smaller: Sequence[Estimate], train: Records) -> bool:

@@ -177,7 +177,7 @@ def name_of(kind: type) -> str:
             return name
         raise UnusableInput(
             f"{kind.__qualname__} is not registered, and a file names the model that reads it; register it "
-            f"(README, Your own model)"
+            f"(docs/own_model.md)"
         ) from error
 
 
