@@ -43,7 +43,7 @@ def told(answer):
         else case
         for case in CASES[::3]
         if case not in ASKED
-    ],  # fmt: skip
+    ],
 )
 def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
     data = hide(rig, {effect: 1.0} if effect else {}, 0.05, seed=7)
