@@ -33,14 +33,11 @@ def report(
         console.rule(suite, align="left")
         for table in tables:
             console.print(to_rich(table, console.width))
-    console.print(f"Written: {written.markdown} and {written.csv}", markup=False, highlight=False)
+    typer.echo(f"Written: {written.markdown} and {written.csv}")
     if figures:
         from simgap.reports.figures import write_figures
 
         files = write_figures(folder, public=public)
-        console.print(
-            f"Figures and LaTeX tables: {len(files)} files in {folder / 'figures'}", markup=False, highlight=False
-        )
+        typer.echo(f"Figures and LaTeX tables: {len(files)} files in {folder / 'figures'}")
     if not no_site:
-        page = write_site(folder, out, public)
-        console.print(f"The site: {page}", markup=False, highlight=False)
+        typer.echo(f"The site: {write_site(folder, out, public)}")

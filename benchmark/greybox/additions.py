@@ -45,9 +45,10 @@ def with_one_more(
     key = key_of(terms, linear_only)
     if key in extended:
         return extended[key]
+    before = baseline.squares if estimate is baseline.estimate else estimate.squares
 
     def worth(fit: Estimate) -> bool:
-        gained = 0.5 * baseline.n_errors * math.log(estimate.squares / fit.squares)
+        gained = 0.5 * baseline.n_errors * math.log(before / fit.squares)
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
@@ -186,7 +187,8 @@ def from_other_poles(baseline: Baseline, before: Estimate, fit: Estimate) -> Est
 
     The poles that the model had then stood in for the effect, and no descent may lead away from them.
     """
-    if fit.squares > STOOD_IN * before.squares or fit.plant.joint:
+    squares = baseline.squares if before is baseline.estimate else before.squares
+    if fit.squares > STOOD_IN * squares or fit.plant.joint:
         return fit
     afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
     return min(fit, afresh, key=lambda fit: fit.squares)

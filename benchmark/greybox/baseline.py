@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -56,10 +56,10 @@ class Baseline:
         """White noise as large as the errors of the plain model; it weighs the outputs against each other."""
         return white_as_large_as(self.estimate.errors, self.train.mask, self.train.resolution)
 
-    @property
+    @cached_property
     def squares(self) -> float:
         """Squared errors of the plain model, weighted as those of all other models."""
-        return self.estimate.squares
+        return self.problem(self.plant).squares(self.estimate.errors)
 
     @cached_property
     def squares_of_mean(self) -> float:
@@ -91,9 +91,3 @@ class Baseline:
             (descend(problem, *start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
             key=lambda fit: fit.squares,
         )
-
-
-def weighed(fit: Estimate, records: Records) -> Estimate:
-    """Count the squares of a plain model in units of its errors' own size, as those of all models with effects are."""
-    noise = white_as_large_as(fit.errors, records.mask, records.resolution)
-    return replace(fit, squares=Problem(fit.plant, records, noise).squares(fit.errors))

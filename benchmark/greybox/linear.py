@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from simgap.greybox.additions import add
-from simgap.greybox.baseline import Baseline, weighed
+from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors, errors_on, in_most
@@ -87,11 +87,10 @@ def _does_as_well(other: Estimate, baseline: Baseline, to_beat: np.ndarray) -> b
 
 
 def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:
-    """Measure the scales of the signals that effects choose bounds by, and weigh the errors as those of all models."""
+    """Measure the scales of the signals that effects choose bounds by."""
     moved = _under_load(plain, records)
     problem = Problem(moved.plant, records, white(records.sizes))
-    plant = replace(plain.plant, scales=scales_of(moved, problem, channels, outputs))
-    return weighed(replace(plain, plant=plant), records)
+    return replace(plain, plant=replace(plain.plant, scales=scales_of(moved, problem, channels, outputs)))
 
 
 def _under_load(plain: Estimate, records: Records) -> Estimate:

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.baseline import Baseline, weighed
+from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import errors_on
 from simgap.greybox.machine import DAMPING, INERTIA, NAMES, STIFFNESS, Machine, machine_of
-from simgap.greybox.noise import white
+from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.outliers import find_glitches, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
@@ -81,7 +81,7 @@ def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -
     assert machine is not None
     problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
     if start is not None:
-        return weighed(descend(problem, start.theta, start.local), records)
+        return _weighed(descend(problem, start.theta, start.local), records)
     gain = np.arange(plant.size) == plant.layout.gains.start
     tried = []
     for theta in _grid(machine, plant, records):
@@ -89,7 +89,13 @@ def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -
         tried.append(descend(problem, theta, fixed=fixed, max_steps=2))
     tried.sort(key=lambda fit: fit.squares)
     best = min((descend(problem, fit.theta, fit.local) for fit in tried[:FINALISTS]), key=lambda fit: fit.squares)
-    return weighed(best, records)
+    return _weighed(best, records)
+
+
+def _weighed(fit: Estimate, records: Records) -> Estimate:
+    """Count the squares in units of the errors' own size, as those of all models with effects are counted."""
+    noise = white_as_large_as(fit.errors, records.mask, records.resolution)
+    return replace(fit, squares=Problem(fit.plant, records, noise).squares(fit.errors))
 
 
 def _grid(machine: Machine, plant: Plant, records: Records) -> Iterator[Float[np.ndarray, " p"]]:
