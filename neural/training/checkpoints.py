@@ -11,7 +11,7 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor, nn
 
 
@@ -27,14 +27,17 @@ class Checkpoint:
     history: dict[str, list[float]]
 
     def save(self) -> None:
-        """Write the state; a reader sees the old file or the new one. A full disk does not end a training."""
+        """Write the state; a reader sees the old file or the new one. A full disk does not end a training.
+
+        The bytes go through a file that `remove` knows: safetensors' own is named at random, and a kill leaves it.
+        """
         if self.path is None:
             return
         metadata = {"history": json.dumps(self.history), "rate": repr(self.adam.param_groups[0]["lr"])}
         partial = self.path.with_name(f"{self.path.name}.{os.getpid()}")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            save_file({name: value.contiguous() for name, value in self._tensors().items()}, partial, metadata)
+            partial.write_bytes(save({name: value.contiguous() for name, value in self._tensors().items()}, metadata))
             partial.replace(self.path)
         except (OSError, SafetensorError):
             with contextlib.suppress(OSError):

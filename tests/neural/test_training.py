@@ -1,12 +1,16 @@
 """Training by the paper's protocol: rate, early stop, the best epoch, and carrying on after an interruption."""
 
+import os
+import resource
+import signal
+
 import numpy as np
 import pytest
 import torch
 
 from simgap.neural.gru import GRU
 from simgap.neural.inception_regularised import InceptionRegularised
-from simgap.neural.training import loop, network
+from simgap.neural.training import checkpoints, loop, network
 from simgap.neural.training.loop import History, NotANumber, Recipe
 from simgap.records import UnusableInput
 
@@ -71,6 +75,27 @@ def test_a_damaged_checkpoint_is_no_reason_to_fail(tmp_path, monkeypatch, data):
     model._checkpoint(data, 0).write_bytes(b"\x08\x00\x00\x00\x00\x00\x00\x00{torn")
     model.fit(data, 0)
     assert model.fitted["epochs"] == 1
+
+
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded")  # from Python 3.12 on, at fork
+def test_what_a_killed_training_wrote_by_half_goes_with_its_checkpoint(tmp_path):
+    net = torch.nn.Linear(64, 64)
+    adam = torch.optim.Adam(net.parameters())
+    net(torch.zeros(64)).sum().backward()
+    adam.step()
+    path = tmp_path / "state.safetensors"
+    checkpoint = checkpoints.Checkpoint(path, net, adam, {}, torch.Generator(), {"train": [1.0]})
+    child = os.fork()
+    if child == 0:  # the kernel kills it in the middle of the file
+        signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+        checkpoint.save()
+        os._exit(0)
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGXFSZ
+    assert len(list(tmp_path.iterdir())) == 1
+    checkpoints.remove(path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_loss_that_is_no_number_is_said_to_be_one(data):
