@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -147,7 +147,8 @@ def the_same_seed_gives_the_same_numbers(candidate: Candidate) -> None:
 
 
 def a_second_fit_forgets_the_first(candidate: Candidate) -> None:
-    twice = candidate.fit(candidate.build(), toy_training(first=50))
+    other = toy_training(first=50)
+    twice = candidate.fit(candidate.build(), replace(other, train=other.train[:2]))
     candidate.fit(twice, toy_training())
     experiment = toy_experiment(9)
     _alike(candidate.one(experiment, twice), candidate.one(experiment), 0.0,

@@ -91,7 +91,7 @@ def read(
         dataset, said = described, None
     else:
         choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
-        table = _table(source, choices)
+        table = read_table(source, choices)
         name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
         dataset, said = dataset_of(table, choices, name)
     theirs = None
@@ -110,7 +110,7 @@ def read_recordings(source: Any, channels: Channels, dt: float | None = None) ->
     known = source if isinstance(source, Dataset) else _known(source, Choices(dt=dt))
     if known is not None:
         return Recordings(known.test, known.training.valid + known.training.train, known.channels)
-    table = _table(source, choices)
+    table = read_table(source, choices)
     for column in (*choices.inputs, *choices.outputs):
         if not find(table.names, column):
             raise UnusableInput(f"{table.source} has no column {column!r}, which the model was fitted on; "
@@ -137,8 +137,8 @@ def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Data
     return None
 
 
-def _table(source: Any, choices: Choices) -> Table:
-    """Read a DataFrame, or a file by its ending; any other ending is CSV."""
+def read_table(source: Any, choices: Choices) -> Table:
+    """Read a DataFrame, or a file by its ending; any other ending is CSV. Raises UnusableInput."""
     if not isinstance(source, str | os.PathLike):
         from simgap.data.formats.frames import table_of  # pandas is slow to import
 

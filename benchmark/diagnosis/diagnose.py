@@ -27,6 +27,7 @@ from simgap.greybox.identification import Identified, channels_of, identify
 from simgap.greybox.leftover import formula, look_for_more
 from simgap.greybox.model import GreyBoxModel
 from simgap.records import Channels, Dataset
+from simgap.stages import stage
 
 # The named effects leave so much of the plain model's error that the input still predicts: then they are not it.
 LEFT_OF_PLAIN = 0.05
@@ -93,6 +94,7 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
     dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, training))
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
+    stage("Weighing the evidence")
     evidence = [Evidence(one, dataset.channels) for one in identified]
     doubt = (controller,) if controller else _doubt(evidence, dataset.channels)
     left, offers = _left(evidence, dataset)
@@ -105,10 +107,13 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
     if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
         verdict = "unexplained"
     elif found and not doubt:
+        stage("Measuring the gain on the test experiments")
         promised = promises.promise(trusted, dataset, before, profiles)
         verdict = "named" if promised.causes else "suspected"
     if verdict == "nothing_found":
         doubt = doubt or unsaid_kinds.undecided(identified, dataset.channels)
+    if views_too:
+        stage("Looking at the error and where it goes")
     model = promised.model if promised else GreyBoxModel([one.plant for one in identified])
     findings = Findings(
         dataset=dataset.name,

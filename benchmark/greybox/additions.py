@@ -11,7 +11,7 @@ import numpy as np
 from simgap.cores import on_cores
 from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.machine import DAMPING
+from simgap.greybox.machine import StandIn
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
 from simgap.greybox.score_test import STARTS, Scored, candidates, score_tests, with_term
@@ -21,7 +21,6 @@ from simgap.greybox.unfolding import unfolded
 # Score tests below this log-likelihood ratio are not worth a refit.
 WORTH_A_REFIT = 2.0
 FIRST_STEPS = 8  # of a fit from each of many starts
-FASTER = (1.0, 5.0, 25.0)  # gains of a loop whose command may be limited, beside that of the loop without a limit
 STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 # Steps of a fit until the candidates are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
@@ -45,10 +44,9 @@ def with_one_more(
     key = key_of(terms, linear_only)
     if key in extended:
         return extended[key]
-    before = baseline.squares if estimate is baseline.estimate else estimate.squares
 
     def worth(fit: Estimate) -> bool:
-        gained = 0.5 * baseline.n_errors * math.log(before / fit.squares)
+        gained = 0.5 * baseline.n_errors * math.log(estimate.squares / fit.squares)
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
     tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
@@ -95,17 +93,32 @@ def _anew(baseline: Baseline, before: Estimate, fits: list[Estimate]) -> list[Es
         return fits
     best = min(fits, key=lambda fit: _cost(baseline, fit))
     others = [fit for fit in fits if fit is not best]
+    known = {term.key for term in before.plant.terms}
+    added = [next(term for term in fit.plant.terms if term.key not in known) for fit in (best, *others)]
     best = from_other_poles(baseline, before, best)
-    return [best, *on_cores(partial(_from_best, baseline, best), others)]
+    pairs = list(zip(others, added[1:], strict=True))
+    return [best, *on_cores(partial(_from_best, baseline, best, added[0]), pairs)]
 
 
-def _from_best(baseline: Baseline, best: Estimate, fit: Estimate) -> Estimate:
-    plant, term = fit.plant, fit.plant.terms[-1]
-    if term.effect.name not in best.plant.terms[-1].effect.contains:
+def _from_best(baseline: Baseline, best: Estimate, general: Term, other: tuple[Estimate, Term]) -> Estimate:
+    """Fit a special case of the best effect from its plant too, with its own numbers and with those that they share."""
+    fit, term = other
+    if not general.replaces(term):
         return fit
-    theta, local = plant.carry(best.plant, best.theta, best.local)
-    theta[plant.part_of(term)] = fit.theta[plant.part_of(term)]
-    return min(fit, baseline.fit(plant.terms, [(theta, local)]), key=lambda fit: fit.squares)
+    theta, local = fit.plant.carry(best.plant, best.theta, best.local)
+    theta[fit.plant.part_of(term)] = fit.theta[fit.plant.part_of(term)]
+    of_own = baseline.fit(fit.plant.terms, [(theta, local)])
+    return min(fit, of_own, as_special_case(baseline, best, general, term), key=lambda fit: fit.squares)
+
+
+def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, special: Term) -> Estimate:
+    """Fit a model again with a special case in the place of an effect, begun with what the two share."""
+    plant = baseline.plant.having([*(term for term in estimate.plant.terms if term != general), special])
+    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+    part, shared = plant.part_of(special), list(general.effect.contains[special.effect.name])
+    numbers = estimate.theta[estimate.plant.part_of(general)][shared]
+    theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
+    return baseline.fit(plant.terms, [(theta, local)])
 
 
 def _cost(baseline: Baseline, fit: Estimate) -> float:
@@ -132,12 +145,12 @@ def extend(
     if term.effect.moves_poles and plant.machine is None:
         thetas = [theta for theta, _ in started(estimate, plant, term)]
         fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
-        if term.effect.hides_sign and plant.ny == 1:
+        if term.effect.hides_sign and plant.ny == 1 and not plant.joint:
             plain = unfolded(baseline.plant, baseline.train)
             theta, local = plant.carry(plain.plant, plain.theta, plain.local)
             theta[plant.n_linear :] = thetas[0][plant.n_linear :]
             return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
-        if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.squares:
+        if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.estimate.squares:
             return fit
         # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
         of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)
@@ -146,38 +159,21 @@ def extend(
     if not scored or scored[0][0] < WORTH_A_REFIT:
         return None
     begun = [(theta, local) for _, theta, local in scored[:STARTS]]
-    if plant.machine is not None and term.effect.role == "friction":
-        # The damping stood in for it, and no descent leads from much of the one to much of the other.
-        begun = begun[:1] + _without_damping(baseline, estimate, plant, term)
-    if plant.machine is not None and term.effect.port == "input" and term.channel == plant.nu:
-        # A slow loop stood in for a fast one whose command is limited.
-        begun = begun[:1] + _in_faster_loops(baseline, estimate, plant, term)
+    if plant.machine is not None and (stand_in := plant.machine.stand_in(term)) is not None:
+        begun = begun[:1] + _without(stand_in, baseline, estimate, plant, term)
     return baseline.fit(plant.terms, begun, max_steps)
 
 
-def _without_damping(
-    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+def _without(
+    stand_in: StandIn, baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Begin a friction from each of its starts with little damping that stays as it is; return the best ones."""
-    assert plant.machine is not None
-    problem, damping = baseline.problem(plant), np.arange(plant.size) == DAMPING
-    fits = [
-        descend(problem, plant.machine.less_damped(theta), local, damping, FIRST_STEPS, TOLERANCE)
-        for theta, local in started(estimate, plant, term)
-    ]
-    fits.sort(key=lambda fit: fit.squares)
-    return [(fit.theta, fit.local) for fit in fits[:STARTS]]
-
-
-def _in_faster_loops(
-    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Begin a limit of the command from each of its starts, with the gain as it is and larger; return the best ones."""
-    problem, gain, fits = baseline.problem(plant), plant.layout.gains.start, []
+    """Begin an effect from each of its starts with what stood in for it out of its way; return the best ones."""
+    problem, at, fits = baseline.problem(plant), stand_in.at, []
+    fixed = np.arange(plant.size) == at if stand_in.stays else None
     for theta, local in started(estimate, plant, term):
-        for factor in FASTER:
-            theta[gain] = np.clip(factor * estimate.theta[gain], plant.low[gain], plant.high[gain])
-            fits.append(descend(problem, theta.copy(), local, None, FIRST_STEPS, TOLERANCE))
+        for factor in stand_in.factors:
+            theta[at] = np.clip(factor * estimate.theta[at], plant.low[at], plant.high[at])
+            fits.append(descend(problem, theta.copy(), local, fixed, FIRST_STEPS, TOLERANCE))
     fits.sort(key=lambda fit: fit.squares)
     return [(fit.theta, fit.local) for fit in fits[:STARTS]]
 
@@ -187,8 +183,7 @@ def from_other_poles(baseline: Baseline, before: Estimate, fit: Estimate) -> Est
 
     The poles that the model had then stood in for the effect, and no descent may lead away from them.
     """
-    squares = baseline.squares if before is baseline.estimate else before.squares
-    if fit.squares > STOOD_IN * squares or fit.plant.joint:
+    if fit.squares > STOOD_IN * before.squares or fit.plant.joint:
         return fit
     afresh = refit_from_poles(baseline.problem(fit.plant), [fit.theta], MAX_STEPS, TOLERANCE)
     return min(fit, afresh, key=lambda fit: fit.squares)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,11 @@ class Baseline:
     cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
     outliers: tuple[Outliers, ...] = ()  # found in the readings, and left out of both records
 
+    def __post_init__(self) -> None:
+        """Weigh the errors of the plain model as those of all models that it is compared with."""
+        weighed = replace(self.estimate, squares=self.problem(self.plant).squares(self.estimate.errors))
+        object.__setattr__(self, "estimate", weighed)
+
     @property
     def plant(self) -> Plant:
         """The plant without effects."""
@@ -55,11 +60,6 @@ class Baseline:
     def noise(self) -> Noise:
         """White noise as large as the errors of the plain model; it weighs the outputs against each other."""
         return white_as_large_as(self.estimate.errors, self.train.mask, self.train.resolution)
-
-    @cached_property
-    def squares(self) -> float:
-        """Squared errors of the plain model, weighted as those of all other models."""
-        return self.problem(self.plant).squares(self.estimate.errors)
 
     @cached_property
     def squares_of_mean(self) -> float:

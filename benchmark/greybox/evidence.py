@@ -52,7 +52,7 @@ class Evidence:
     @property
     def explained(self) -> float:
         """Share of the plain model's squared error in training that the effects explain together."""
-        return 1 - self.selection.trial.estimate.squares / self.selection.baseline.squares
+        return 1 - self.selection.trial.estimate.squares / self.selection.baseline.estimate.squares
 
     @property
     def found(self) -> bool:
@@ -82,12 +82,12 @@ class Evidence:
         What takes most of the held-out error is next: it is what training has not been fitted to.
         """
         selection = self.selection
-        left, before, listed = list(selection.trial.terms), selection.baseline.squares, []
+        left, before, listed = list(selection.trial.terms), selection.baseline.estimate.squares, []
         while left:
             known = [term for term, _ in listed]
             fits = selection.each_only([[*known, term] for term in left])
             term, fit = min(zip(left, fits, strict=True), key=lambda pair: float(pair[1].blocks.sum()))
-            listed.append((term, (before - fit.estimate.squares) / selection.baseline.squares))
+            listed.append((term, (before - fit.estimate.squares) / selection.baseline.estimate.squares))
             left.remove(term)
             before = fit.estimate.squares
         return listed

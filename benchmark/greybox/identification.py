@@ -21,6 +21,7 @@ from simgap.greybox.rivals import of_better_joint, of_better_order
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.selection import Selection, select
 from simgap.records import Channels, TrainingSet
+from simgap.stages import stage
 
 STILL_FAR = 0.5  # of the readings that were left out: fewer, and they were never bad
 
@@ -50,12 +51,14 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
     identified = []
     for outputs in plants_of(channels):
         output = outputs[0]
+        stage(f"Fitting the plain linear model of {channels.outputs[output].name}")
         unsaid = effects and channels.outputs[output].kind_from == "unknown"
         settled = settle(data, channels, output) if unsaid else None
         of_kind = with_kind(channels, output, settled.kind) if settled else channels
         selection = _selected(data, of_kind, outputs, settled) if effects else _plain(data, of_kind, outputs)
         linear = None
         if effects and channels.plant is None:
+            stage("Comparing with linear models of other orders")
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             linear = linear_rival(data, of_kind, selection)
         best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.effects.effect import Parameter
+from simgap.greybox.terms import Term
 from simgap.known_plant import ANGLES, Known, KnownPlant
 from simgap.records import Channels
 
@@ -19,8 +21,17 @@ INERTIA, DAMPING, BACK_EMF, MASS, ARM, DERIVATIVE, STIFFNESS = range(len(NAMES))
 SUBSTEPS = 2
 INF = math.inf
 FASTEST = 1.0  # rad in a sample, of a loop that is closed
-LESS = 0.1  # of the damping
+LESS_DAMPED = (0.1,)  # shares of the damping
+FASTER = (1.0, 5.0, 25.0)  # gains of a loop whose command may be limited, beside that of the loop without a limit
 SMALL = 1e-3  # share of its usual size that a number near zero counts as
+
+
+class StandIn(NamedTuple):
+    """A number of a machine in the place of an effect; no descent leads from much of the one to much of the other."""
+
+    at: int  # in theta
+    factors: tuple[float, ...]  # from which the effect is begun
+    stays: bool  # as it is, in the first steps
 
 
 @dataclass(frozen=True)
@@ -91,11 +102,13 @@ class Machine:
             shapes.append(np.clip(shape, [p.low for p in self.parameters], [p.high for p in self.parameters]))
         return shapes
 
-    def less_damped(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
-        """Take the damping away that may have stood in for another force."""
-        less = theta.copy()
-        less[DAMPING] = np.clip(LESS * less[DAMPING], self.parameters[DAMPING].low, self.parameters[DAMPING].high)
-        return less
+    def stand_in(self, term: Term) -> StandIn | None:
+        """Tell which number of the machine may have taken the part of an effect that it was fitted without."""
+        if term.effect.role == "friction":
+            return StandIn(DAMPING, LESS_DAMPED, stays=True)
+        if term.effect.port == "input" and term.channel == len(self.names):  # a slow loop for a limit of its command
+            return StandIn(len(NAMES), FASTER, stays=False)
+        return None
 
     def column(self, u: Float[np.ndarray, "E T nu"], known: Known | None, other: float) -> Float[np.ndarray, "E T"]:
         """Return a constant over time: a column in SI units, a number, or `other` where it is not known."""

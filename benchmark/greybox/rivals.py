@@ -48,7 +48,7 @@ def _asks_for_order(selection: Selection) -> bool:
     """Tell whether a lag may be missing beside effects, or a second mass where one leaves much of a velocity open."""
     baseline, chosen = selection.baseline, selection.trial.estimate
     if baseline.plant.kind == "velocity" and not _may_lose_sign(baseline):
-        left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.squares
+        left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.estimate.squares
         return left > UNEXPLAINED
     return _may_lose_sign(baseline) or any(not term.effect.linear for term in selection.trial.terms)
 

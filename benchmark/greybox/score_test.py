@@ -61,7 +61,6 @@ def score(baseline: Baseline, estimate: Estimate, jacobian: Jacobian, term: Term
     if term in plant.per_experiment or (term.effect.moves_poles and plant.machine is None):
         return []
     e = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)
-    ee = baseline.squares if estimate is baseline.estimate else estimate.squares
     extended = baseline.problem(plant)
     without = baseline.problem(estimate.plant).simulator.run(estimate.theta, estimate.local)
     scored = []
@@ -89,7 +88,7 @@ def score(baseline: Baseline, estimate: Estimate, jacobian: Jacobian, term: Term
             parameter = plant.parameters_of(term)[amplitude]
             moved = start.values[amplitude] * along / rest
             theta[part.start + amplitude] = float(np.clip(moved, parameter.low, parameter.high))
-        ratio = max(1 - (along / rest) * (along / ee), 1e-12)
+        ratio = max(1 - (along / rest) * (along / estimate.squares), 1e-12)
         scored.append((-0.5 * baseline.n_errors * math.log(ratio), theta, local))
     return sorted(scored, key=lambda one: -one[0])
 

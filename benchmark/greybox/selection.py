@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.additions import Extended, extend, key_of, with_one_more
+from simgap.greybox.additions import Extended, as_special_case, extend, key_of, with_one_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import log_likelihood
 from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, assess, assessed, holds_out, judged, ranked, significant
+from simgap.stages import stage
 
 # Log-likelihood ratio that confirms what the readings show already.
 CONFIRMED = 8.0
@@ -111,6 +112,7 @@ class _Search:
     def forward(self, trial: Trial, linear_only: bool = False) -> Trial:
         """Add the best effect, one after the other, while noise alone would not do as well."""
         while len(trial.terms) < self.baseline.plant.most_terms:
+            stage(_looking(trial, linear_only))
             fits = with_one_more(self.baseline, trial.estimate, self.extended, linear_only)
             self.noise_order, trial, trials = judged(self.baseline, trial, fits, self.noise_order)
             self.rounds.append(Round(trial, trials))
@@ -121,18 +123,25 @@ class _Search:
         return trial
 
     def backward(self, trial: Trial) -> Trial:
-        """Take out, one by one, the effects that no longer pass alone against the rest; those that stay do."""
+        """Take out, one by one, what no longer passes alone against the rest; what stays does.
+
+        That is an effect, or what makes it more general than a special case of it.
+        """
         while trial.terms:
-            smaller = on_cores(partial(without, self.baseline, trial, self.noise_order), trial.terms)
+            choices = [(term, special) for term in trial.terms for special in (None, *self._special_cases(term))]
+            smaller = on_cores(partial(with_less, self.baseline, trial, self.noise_order), choices)
             enough = [
                 other
-                for term, other in zip(trial.terms, smaller, strict=True)
+                for (term, _), other in zip(choices, smaller, strict=True)
                 if not passes(self.baseline, term, other, trial)
             ]
             if not enough:
                 break
             trial = max(enough, key=lambda other: other.score)
         return trial
+
+    def _special_cases(self, term: Term) -> list[Term]:
+        return [t for t in candidates(self.baseline) if term.replaces(t) and t.channel == term.channel]
 
     def exchange(self, trial: Trial) -> Trial:
         """Try every other effect in the place of each, because the first choice was made without the others.
@@ -142,6 +151,7 @@ class _Search:
         for term in trial.terms if 1 < len(trial.terms) < self.baseline.plant.most_terms else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
+            stage(f"Trying others in the place of {term.effect.title}")
             rest = self._without(trial, term)
             fits = with_one_more(self.baseline, rest.estimate, self.extended)
             trials = assessed(self.baseline, fits, self.noise_order)
@@ -155,6 +165,12 @@ class _Search:
 
     def _without(self, trial: Trial, term: Term) -> Trial:
         return without(self.baseline, trial, self.noise_order, term)
+
+
+def _looking(trial: Trial, linear_only: bool) -> str:
+    beside = ", ".join(term.effect.title for term in trial.terms)
+    wanted = "delay, lag and constant load" if linear_only else "a cause"
+    return f"Looking for {wanted} beside {beside}" if beside else f"Looking for {wanted}"
 
 
 def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> bool:
@@ -172,6 +188,14 @@ def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> boo
 def without(baseline: Baseline, trial: Trial, noise_order: int, term: Term) -> Trial:
     """Fit a model again with one term less."""
     return only(baseline, trial, noise_order, [other for other in trial.terms if other != term])
+
+
+def with_less(baseline: Baseline, trial: Trial, noise_order: int, less: tuple[Term, Term | None]) -> Trial:
+    """Fit a model again without a term, or with a special case of it."""
+    term, special = less
+    if special is None:
+        return without(baseline, trial, noise_order, term)
+    return assess(baseline, as_special_case(baseline, trial.estimate, term, special), noise_order)
 
 
 def only(baseline: Baseline, trial: Trial, noise_order: int, terms: Sequence[Term]) -> Trial:

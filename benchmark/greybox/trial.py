@@ -122,7 +122,7 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
     gain = smaller.estimate.squares - larger.estimate.squares
-    matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.squares
+    matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.estimate.squares
     return bool(matters and chance < FALSE_NAMES and holds_out(baseline, smaller, larger))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from numpy.random import Generator
+from scipy.signal import lfilter
 
 from simgap.records import Channels, Dataset, Experiment, TrainingSet
 
@@ -29,6 +30,22 @@ def ramps(samples: int, shortest: int, longest: int, rng: Generator) -> Float[np
     turns = np.cumsum(rng.integers(shortest, longest + 1, samples // shortest + 2)) - shortest
     peaks = rng.uniform(0.4, 1.0, len(turns)) * (-1.0) ** (np.arange(len(turns)) + rng.integers(2))
     return np.interp(np.arange(samples), turns, peaks)
+
+
+def coloured_noise(
+    shape: int | tuple[int, ...], colour: float, rng: Generator
+) -> Float[np.ndarray, " T"] | Float[np.ndarray, "T n"]:
+    """Draw stationary AR(1) noise of variance 1 along the first axis, `colour` its correlation from row to row."""
+    draws = rng.standard_normal(shape)
+    draws[1:] *= np.sqrt(1 - colour**2)
+    return np.asarray(lfilter([1.0], [1.0, -colour], draws, axis=0))
+
+
+def lagged(motion: Float[np.ndarray, " n"], lag: float, h: float) -> Float[np.ndarray, " n"]:
+    """Solve lag x' + x = motion from x = 0, exactly where the motion is straight between its rows, h apart."""
+    keep = np.exp(-h / lag)
+    old = lag / h * (1 - keep) - keep  # weight of the row before
+    return np.asarray(lfilter([1 - keep - old, old], [1, -keep], motion))
 
 
 def in_splits(

@@ -9,7 +9,6 @@ import numpy as np
 
 from simgap.findings import Budget, Findings, Profile, Trace, Value, Wrong
 from simgap.reports.diagnosis import numbers
-from simgap.reports.diagnosis.their_simulation import owner_of
 from simgap.reports.diagnosis.traces import axis_range, thin
 from simgap.reports.diagnosis.words import LAST, parts_of, shorten
 from simgap.reports.rendering import printable
@@ -122,7 +121,7 @@ def budget_figure(findings: Findings) -> go.Figure | None:
     if not outputs:
         return None
     figure.update_layout(barmode="relative")
-    figure.update_xaxes(title_text=f"share of {owner_of(findings)} squared error [%]")
+    figure.update_xaxes(title_text="share of the squared error [%]")
     figure.update_yaxes(autorange="reversed", automargin=True, showticklabels=len(outputs) > 1)
     return _styled(figure, 60 + 46 * len(outputs), 10, 48)
 

@@ -36,10 +36,11 @@ class _Plots:
         return to_html(figure, CONFIG, full_html=False, include_plotlyjs=False, default_width="100%", div_id=name)
 
 
-def diagnosis_page(findings: Findings) -> str:
+def diagnosis_page(findings: Findings, bar: str = "") -> str:
     """Write the whole answer: headline, gain, experiments, causes and suspects, what else the simulation gets wrong.
 
-    Whatever comes from a data set is text there: it is escaped, in plots too, and the page may load nothing.
+    Whatever comes from a data set is text there: it is escaped, in plots too, and the page may load nothing. `bar` is
+    HTML that stands above the headline.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
@@ -52,6 +53,7 @@ def diagnosis_page(findings: Findings) -> str:
     shown: set[int] = set()
     content = {
         "findings": findings,
+        "bar": bar,
         "numbers": numbers,
         "wording": wording,
         "words": words,

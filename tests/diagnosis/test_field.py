@@ -25,7 +25,7 @@ def named(answer):
     [
         ("speed_loop", {"coulomb_friction": 0.5}, 0.02, 0.0, 1),
         pytest.param("axis", {"constant_load": 0.5, "coulomb_friction": 0.5}, 0.02, 0.0, 50, marks=pytest.mark.slow),
-        ("axis", {"dead_zone": 0.25}, 0.01, 0.8, 45),
+        pytest.param("axis", {"dead_zone": 0.25}, 0.01, 0.8, 45, marks=pytest.mark.slow),
         ("pendulum", {"gravity": 0.5}, 0.02, 0.0, 115),
         ("pendulum", {"gravity": 1.0}, 0.05, 0.0, 206000),  # it turns over, and no linear model follows it
     ],

@@ -11,12 +11,14 @@ GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
 
 SLOW = (
     "arm_pendulum",
+    "buck_converter",
     "damper_36lb",
     "dart_car",
     "loop_FIC20102",
     "loop_FIC40102C",
     "loop_LIC30501",
     "servo_xl330",
+    "two_heaters",
 )  # more than ten seconds each
 
 

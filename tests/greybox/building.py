@@ -68,7 +68,7 @@ def gain_of_refit(search, name):
     """Half of N times the fall of the log of the squared errors, when the package fits the effect along."""
     found = add(search, search.estimate, term(name))
     after = found.errors[search.train.mask]
-    return 0.5 * after.size * np.log(search.squares / found.squares)
+    return 0.5 * after.size * np.log(search.estimate.squares / found.squares)
 
 
 def with_effects(search, *names):
@@ -128,7 +128,7 @@ def trial(search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out
     `squares` of the plain model's; `own` and `own_there` count numbers of single experiments in training and held-out
     data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data.
     """
-    estimate = replace(search.estimate, squares=squares * search.squares)
+    estimate = replace(search.estimate, squares=squares * search.estimate.squares)
     blocks = np.ones(20) if held_out is None else np.asarray(held_out, dtype=float)
     return Trial((), estimate, float(log_likelihood), float(held_out_gain), parameters, own, own_there, blocks)
 

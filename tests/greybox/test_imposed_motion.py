@@ -56,7 +56,8 @@ def first_name(answer):
     return answer.findings.verdict, *[cause.effect for cause in answer.causes[:1]]
 
 
-@pytest.mark.parametrize("gap", [0.0, pytest.param(6.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.0, 6.0])
 def test_a_spring_that_slips_is_hysteresis_with_the_gap_that_it_crosses(gap):
     answer = diagnose(dataset(lambda x, begin: slipping(x, 2.0, gap, 5.0, begin) + 0.1 * x, seed=1), views_too=False)
     assert first_name(answer) == ("named", "hysteresis")

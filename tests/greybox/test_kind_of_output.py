@@ -71,7 +71,7 @@ def test_a_sine_is_not_the_velocity_of_its_own_derivative():
     ("rig", "effect", "kind"),
     [
         ("cart", "coulomb_friction", "velocity"),
-        ("stage", "coulomb_friction", "position"),
+        pytest.param("stage", "coulomb_friction", "position", marks=pytest.mark.slow),
         ("tank", "sqrt_outflow", "level"),
     ],
 )

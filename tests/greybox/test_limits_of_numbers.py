@@ -32,7 +32,11 @@ def test_data_without_noise_have_no_effects_and_no_outliers():
 def test_an_output_that_never_moves_has_a_model_of_finite_numbers(kind, offset):
     u = steps(np.random.default_rng(1), (4, 60))
     baseline = baseline_of(np.full((4, 60, 1), offset), u, kind)
-    assert np.isfinite(baseline.estimate.theta).all() and np.isfinite(baseline.squares) and baseline.squares > 0
+    assert (
+        np.isfinite(baseline.estimate.theta).all()
+        and np.isfinite(baseline.estimate.squares)
+        and baseline.estimate.squares > 0
+    )
 
 
 def test_of_two_perfect_fits_none_is_more_likely():

@@ -41,7 +41,11 @@ def test_the_first_sentence_says_that_order_does_as_well_and_the_answer_shows_th
 
 @pytest.mark.parametrize(
     ("rig", "effects"),
-    [("cart", {"coulomb_friction": 0.5}), ("cart", {"actuator_lag": 0.5}), ("slide", {"input_delay": 0.5})],
+    [
+        ("cart", {"coulomb_friction": 0.5}),
+        ("cart", {"actuator_lag": 0.5}),
+        pytest.param("slide", {"input_delay": 0.5}, marks=pytest.mark.slow),
+    ],
 )
 def test_an_effect_that_is_there_is_not_beaten(rig, effects):
     data = rigs.hide(rig, effects, noise=0.05, seed=3)

@@ -91,7 +91,7 @@ def test_an_effect_in_a_servo_is_found_with_its_size(effect, hidden, size):
     plant = baseline.plant
     term = Term(EFFECTS[effect](), plant.machine.of_drive if effect == "rate_limit" else 0)
     fit = extend(baseline, baseline.estimate, term)
-    assert fit is not None and fit.squares < 0.2 * baseline.squares
+    assert fit is not None and fit.squares < 0.2 * baseline.estimate.squares
     assert fit.theta[fit.plant.part_of(term)][0] == pytest.approx(size, rel=0.15)
 
 

@@ -51,6 +51,13 @@ def test_an_effect_that_stands_alone_must_pass_against_the_plain_model(name):
     assert pruned(linear, with_effects(linear, name)) == ()
 
 
+@pytest.mark.parametrize(("hidden", "named"), [("coulomb_friction", "coulomb_friction"), ("load_friction",) * 2])
+def test_what_makes_an_effect_more_general_must_pass_too(hidden, named):
+    data = hide("cart", {hidden: 1.0}, noise=0.05, seed=7).training
+    plain = plain_search(data.train, data.valid, "velocity")
+    assert pruned(plain, with_effects(plain, "load_friction")) == (named,)
+
+
 def test_what_the_readings_seemed_to_show_must_pass_against_the_rest_too():
     # Readings that never fall below zero look like those of a sensor without sign; the machine just does not go there.
     rng = np.random.default_rng(5)

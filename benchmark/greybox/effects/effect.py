@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -120,8 +120,9 @@ class Effect(ABC):
     shows_in: ClassVar[tuple[ViewName, ...]] = ()
     # Effects that data may not tell from this one, and the experiment that would; each pair stands in one file only.
     confounders: ClassVar[dict[str, str]] = {}
-    # Simpler effects that this one contains as a special case; it takes their place in a model.
-    contains: ClassVar[tuple[str, ...]] = ()
+    # Simpler effects that this one contains as a special case, and which of its parameters are theirs; it takes their
+    # place in a model.
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {}
     # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
     memory: ClassVar[int] = 0
     # What the simulation does with the value of a force term.

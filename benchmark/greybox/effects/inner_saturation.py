@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar, final
 
 import numpy as np
@@ -31,7 +31,7 @@ class InnerSaturation(InputEffect):
     place_in_chain: ClassVar[int] = 75
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     substeps: ClassVar[int] = 4
-    contains: ClassVar[tuple[str, ...]] = ("actuator_lag", "input_saturation")
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"actuator_lag": (0,), "input_saturation": (2,)}
     shows_in: ClassVar[tuple[ViewName, ...]] = ("amplitude", "input", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
         "actuator_lag": "apply steps of several sizes: behind a lag alone all of them end in proportion to the input",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 from simgap.findings import ViewName
@@ -26,7 +27,7 @@ class LoadFriction(ForceEffect):
     )
     role: ClassVar[Role] = "friction"
     memory: ClassVar[int] = 1
-    contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"coulomb_friction": (0,)}
     shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
     confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "repeat a slow stroke with twice the load: friction that grows with it doubles as well",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 from simgap.findings import ViewName
@@ -23,7 +24,7 @@ class StribeckFriction(ForceEffect):
     )
     reference: ClassVar[str] = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, sec. 2"
     role: ClassVar[Role] = "friction"
-    contains: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"coulomb_friction": (0,)}
     shows_in: ClassVar[tuple[ViewName, ...]] = ("velocity", "rate of change", "sign of velocity")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:

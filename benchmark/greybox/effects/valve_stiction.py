@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import numpy as np
@@ -28,7 +29,7 @@ class ValveStiction(InputEffect):
         "Choudhury, Thornhill, Shah, Modelling valve stiction, Control Engineering Practice 13, 2005, fig. 5"
     )
     place_in_chain: ClassVar[int] = 60
-    contains: ClassVar[tuple[str, ...]] = ("backlash",)
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"backlash": (0,)}
     memory: ClassVar[int] = 1
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "input")
     confounders: ClassVar[dict[str, str]] = {

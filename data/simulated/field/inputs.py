@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 from numpy.random import Generator
-from scipy.signal import lfilter
 
 from simgap.data.simulated.field.machines import Plant
 from simgap.data.simulated.signals import ramps, sines, steps
@@ -35,10 +34,3 @@ def slow_disturbance(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:
     """Add three sines with periods of 0.7 to 3 records; of standard deviation about 1 over many records."""
     cycles, phases = 1 / rng.uniform(0.7, 3.0, 3), rng.random(3)
     return np.sin(2 * np.pi * (np.arange(samples)[:, None] / samples * cycles + phases)).sum(axis=1) / np.sqrt(1.5)
-
-
-def coloured_noise(samples: int, colour: float, rng: Generator) -> Float[np.ndarray, " T"]:
-    """Draw AR(1) noise of standard deviation 1."""
-    draws = rng.standard_normal(samples)
-    draws[1:] *= np.sqrt(1 - colour**2)
-    return np.asarray(lfilter([1.0], [1.0, -colour], draws))

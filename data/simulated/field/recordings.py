@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.random import Generator, default_rng
 
-from simgap.data.simulated.field.inputs import coloured_noise, draw_wanted, slow_disturbance
+from simgap.data.simulated.field.inputs import draw_wanted, slow_disturbance
 from simgap.data.simulated.field.kernels import Actuator, Machine, run
 from simgap.data.simulated.field.machines import RIGS, Plant
 from simgap.data.simulated.field.sizes import apply, largest_angle, suitable
-from simgap.data.simulated.signals import in_splits
+from simgap.data.simulated.signals import coloured_noise, in_splits
 from simgap.records import Dataset, Experiment
 
 COUNTS = (8, 4, 4)  # experiments to train, validate and test on

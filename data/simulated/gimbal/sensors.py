@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 from numpy.random import Generator
-from scipy.signal import lfilter
 
 from simgap.data.simulated.gimbal.parameters import Gimbal
+from simgap.data.simulated.signals import coloured_noise, lagged
 
 KEPT_EVERY = 0.1  # s; the noise's colour is stated between samples this far apart
 
@@ -24,10 +24,14 @@ def measure(
     """
     drift_rng, bias_rng, noise_rng, outlier_rng = rng.spawn(4)
     t = dt * np.arange(len(motion))[:, None]  # [n, 1]
-    readings = _lag(motion, parameters.sensor_lag, dt)
+    readings = motion.copy()
+    for channel, lag in enumerate(parameters.sensor_lag):
+        if lag > 0:
+            readings[:, channel] = lagged(motion[:, channel], lag, dt)
     readings = readings + np.array(parameters.bias) * bias_rng.standard_normal(2)
     readings += np.array(parameters.drift) * drift_rng.standard_normal(2) * t
-    readings += np.array(parameters.noise) * _noise(len(t), parameters.noise_colour, dt, noise_rng)
+    colour = parameters.noise_colour ** (dt / KEPT_EVERY)
+    readings += np.array(parameters.noise) * coloured_noise(readings.shape, colour, noise_rng)
     readings = np.where(parameters.absolute_sensor, np.abs(readings), readings)
     readings = np.clip(readings, -np.array(parameters.sensor_limit), parameters.sensor_limit)
     for channel, step in enumerate(parameters.quantisation):
@@ -36,22 +40,3 @@ def measure(
     hit = outlier_rng.random(readings.shape) < parameters.outlier_rate  # [n, 2]
     sign = outlier_rng.choice(np.array([-1.0, 1.0]), readings.shape)
     return readings + hit * sign * np.array(parameters.outlier_size)
-
-
-def _lag(motion: Float[np.ndarray, "n 2"], lags: tuple[float, float], dt: float) -> Float[np.ndarray, "n 2"]:
-    """Solve lag x' + x = motion from x = motion[0] = 0, exactly where the motion is straight between its rows."""
-    lagged = motion.copy()
-    for channel, lag in enumerate(lags):
-        if lag > 0:
-            keep = np.exp(-dt / lag)
-            old = lag / dt * (1 - keep) - keep  # weight of the row before
-            lagged[:, channel] = lfilter([1 - keep - old, old], [1, -keep], motion[:, channel])
-    return lagged
-
-
-def _noise(samples: int, colour: float, dt: float, rng: Generator) -> Float[np.ndarray, "n 2"]:
-    """Draw stationary AR(1) noise of variance 1 whose correlation over KEPT_EVERY seconds is `colour`."""
-    noise = rng.standard_normal((samples, 2))  # [n, 2]
-    keep = colour ** (dt / KEPT_EVERY)
-    noise[1:] *= np.sqrt(1 - keep**2)
-    return np.asarray(lfilter([1.0], [1.0, -keep], noise, axis=0))

@@ -8,9 +8,9 @@ from math import inf
 import numpy as np
 from jaxtyping import Float
 from numpy.random import Generator
-from scipy.signal import lfilter
 
 from simgap.data.simulated.rigs.plants import Rig
+from simgap.data.simulated.signals import coloured_noise, lagged
 
 
 def measure(
@@ -27,11 +27,7 @@ def measure(
     y = motion[::substeps].copy()
     first = motion[:, 0]
     if lag := size.get("sensor_lag", 0.0):
-        # Exact where the motion is straight within a substep; the sensor has settled before the first sample.
-        h = rig.dt / substeps
-        keep = np.exp(-h / lag)
-        old = lag / h * (1 - keep) - keep  # weight of the row before
-        first = first[0] + lfilter([1 - keep - old, old], [1, -keep], first - first[0])
+        first = first[0] + lagged(first - first[0], lag, rig.dt / substeps)  # settled before the first sample
     reading = first[::substeps].copy()
     if "absolute" in size:
         reading = np.abs(reading)
@@ -39,9 +35,7 @@ def measure(
     reading += size.get("bias", 0.0) * bias_rng.standard_normal()
     reading += size.get("drift", 0.0) * drift_rng.standard_normal() * rig.dt * np.arange(len(reading))
     y[:, 0] = reading
-    draws = noise_rng.standard_normal(y.shape)
-    draws[1:] *= np.sqrt(1 - colour**2)
-    y += spread * lfilter([1.0], [1.0, -colour], draws, axis=0)
+    y += spread * coloured_noise(y.shape, colour, noise_rng)
     limit, step = size.get("sensor_limit", inf), size.get("step", 0.0)
     y[:, 0] = np.clip(y[:, 0], -limit, limit)
     if step:
