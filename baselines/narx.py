@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.forward_selection import forward_selection
-from simgap.baselines.estimation.levenberg import minimise
 from simgap.baselines.estimation.monomials import monomials, regressors, values
-from simgap.baselines.estimation.narx_error import BOUND, NarxError, PolynomialNarx
+from simgap.baselines.estimation.narx_error import BOUND, NarxError, PolynomialNarx, refined, refined_safely
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -40,6 +40,7 @@ class Narx:
     max_terms: int = 30
     model: PolynomialNarx = field(init=False, repr=False)
 
+    @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the terms on train and valid, then estimate on both together; nothing here is random."""
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)
@@ -50,11 +51,15 @@ class Narx:
             equation = NarxError.of(model, held_out, data.n_init)
             return equation.squares(model.theta) / equation.samples if equation.records else np.inf
 
+        def safe_error(model: PolynomialNarx) -> float:
+            return np.inf if NarxError.of(model, records, data.n_init).strays() else error(model)
+
         found = sorted((min(((error(m), m) for m in of), key=_first) for of in self._rankings(data)), key=_first)
-        refined = [_refined(model, records, data.n_init) for _, model in found[:REFINED]]
-        best = min([found[0], *((error(model), model) for model in refined)], key=_first)
-        best = self._pruned(best, records, error, data.n_init)
-        self.model = _refined(best[1], [*data.train, *data.valid], data.n_init)
+        safe = [pair for pair in found if np.isfinite(safe_error(pair[1]))] or found
+        finished = [refined(model, records, data.n_init, STEPS) for _, model in safe[:REFINED]]
+        best = min([safe[0], *((safe_error(model), model) for model in finished)], key=_first)
+        best = self._pruned(best, records, safe_error, data.n_init)
+        self.model = refined_safely(best[1], [*data.train, *data.valid], data.n_init, STEPS)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -102,7 +107,7 @@ class Narx:
             keep = np.arange(len(t)) != int(np.argmin(t))
             model = best[1]
             fewer = replace(model, terms=model.terms[keep], owner=model.owner[keep], theta=model.theta[keep])
-            fewer = _refined(fewer, records, n_init)
+            fewer = refined(fewer, records, n_init, STEPS)
             if error(fewer) > best[0]:
                 break
             best = error(fewer), fewer
@@ -130,11 +135,6 @@ class Narx:
             yield replace(
                 all_terms, terms=all_terms.terms[np.concatenate(chosen)], owner=owner, theta=np.concatenate(theta)
             )
-
-
-def _refined(model: PolynomialNarx, experiments: Sequence[Experiment], n_init: int) -> PolynomialNarx:
-    equation = NarxError.of(model, experiments, n_init)
-    return replace(model, theta=minimise(equation, model.theta, STEPS).theta) if equation.records else model
 
 
 def _size(signals: np.ndarray) -> np.ndarray:

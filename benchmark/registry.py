@@ -1,4 +1,4 @@
-"""Names for models, effects, data sets and engines. A new one is one new file with one decorator."""
+"""Names for models, effects, data sets, engines and adapters. A new one is one new file with one decorator."""
 
 from __future__ import annotations
 
@@ -166,6 +166,7 @@ def _registered(path: Path, constant: str) -> Iterator[tuple[str, str]]:
 
 MODELS = Registry("model", ("simgap.baselines", "simgap.neural"), "MODELS")
 EFFECTS = Registry("effect", ("simgap.greybox.effects",), "EFFECTS")
+ADAPTERS = Registry("adapter", ("simgap.recovery.adapters",), "ADAPTERS")
 ENGINES = Registry("engine", ("simgap.running.engines",), "ENGINES")
 DATASETS = Registry(
     "dataset", ("simgap.data.measured", "simgap.data.simulated", "simgap.data.simulated.gimbal"), "DATASETS"

@@ -17,6 +17,7 @@ from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
+from simgap.baselines.estimation.state_space import StateSpace
 from simgap.records import Channels, Experiment, TrainingSet, UnusableInput
 from simgap.step_form import StepForm
 
@@ -160,26 +161,33 @@ class LinearModel(ABC):
 
 
 def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_init: int) -> LinearFit:
-    """Choose the fit with the fewest coefficients whose free run is no worse than the best by more than chance.
+    """Choose the fit with the fewest coefficients whose free run is no worse than the best by more than chance."""
+    return fits[simplest([fit.polynomial for fit in fits], [fit.n_params for fit in fits], valid, n_init)]
+
+
+def simplest(
+    models: Sequence[Polynomial | StateSpace], sizes: Sequence[int], valid: Sequence[Experiment], n_init: int
+) -> int:
+    """Choose the smallest model whose free run is no worse than the best by more than chance, and give its place.
 
     Chance is one standard error of the difference over pieces of the validation data (Breiman, Friedman, Olshen and
     Stone 1984, section 3.4.3, on paired differences).
     """
-    errors = np.array([free_run_errors(fit.polynomial, valid, n_init) for fit in fits])  # [F, K]
+    errors = np.array([free_run_errors(model, valid, n_init) for model in models])  # [F, K]
     best = int(np.argmin(errors.mean(axis=1)))
     if not np.isfinite(errors[best]).all():
-        return min(fits, key=lambda fit: fit.n_params)
+        return int(np.argmin(sizes))
     if errors.shape[1] == 1:  # nothing tells what chance is
-        return fits[best]
+        return best
     with np.errstate(over="ignore", invalid="ignore"):  # a fit that diverged has huge or infinite errors
         worse = errors - errors[best]
         chance = worse.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])
         as_good = worse.mean(axis=1) <= np.nan_to_num(chance)
-    return min((fit for fit, good in zip(fits, as_good, strict=True) if good), key=lambda fit: fit.n_params)
+    return int(np.argmin(np.where(as_good, sizes, np.inf)))
 
 
 def free_run_errors(
-    model: Polynomial, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
+    model: Polynomial | StateSpace, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
 ) -> Float[np.ndarray, " K"]:
     """Average mse / variance over the outputs, in `pieces` pieces or more of all experiments; inf if it diverges."""
     spread = np.concatenate([e.y[n_init:] for e in experiments]).var(axis=0)

@@ -7,13 +7,16 @@ from numba import njit
 
 
 @njit(
-    "(float64[:,::1], float64[:,::1], float64[:,:,::1], int64, int64, int64[:,::1], int64[::1], float64[::1], float64)",
+    "(float64[:,::1], float64[:,::1], float64[:,:,::1], int64, int64, float64[:,::1], float64[::1], int64[:,::1],"
+    "int64[::1], float64[::1], float64)",
     cache=True,
 )
-def run_free(u, y, s, lags, nk, terms, owner, theta, bound):  # noqa: PLR0912  # one loop over time
+def run_free(u, y, s, lags, nk, past, base, terms, owner, theta, bound):  # noqa: PLR0912  # one loop over time
     """Fill y [lags + T, ny] after its first `lags` rows: y_i(t) = sum of theta_k times term k, for the k of output i.
 
-    u [lags + T, nu]. s [lags + T, ny, p], where it is as long as y, is filled with dy/dtheta. No y leaves +-bound.
+    Terms are products of past (y(t-1), .., y(t-lags)) and of past (u(t-nk), ..), `past` [lags+1, lags+1] being 1 or
+    what makes differences of them; base [lags] (y(t-1), ..) is added. u [lags + T, nu]. s [lags + T, ny, p], where it
+    is as long as y, is filled with dy/dtheta. No y leaves +-bound.
     """
     ny, nu, count, degree = y.shape[1], u.shape[1], len(theta), terms.shape[1]
     own = lags * ny
@@ -23,12 +26,18 @@ def run_free(u, y, s, lags, nk, terms, owner, theta, bound):  # noqa: PLR0912  #
     for t in range(lags, len(y)):
         for k in range(lags):
             for i in range(ny):
-                r[1 + k * ny + i] = y[t - 1 - k, i]
+                r[1 + k * ny + i] = 0.0
+                for h in range(lags):
+                    r[1 + k * ny + i] += past[k, h] * y[t - 1 - h, i]
         for k in range(lags + 1 - nk):
             for j in range(nu):
-                r[1 + own + k * nu + j] = u[t - nk - k, j]
+                r[1 + own + k * nu + j] = 0.0
+                for h in range(lags + 1 - nk):
+                    r[1 + own + k * nu + j] += past[k, h] * u[t - nk - h, j]
         for i in range(ny):
             y[t, i] = 0.0
+            for h in range(lags):
+                y[t, i] += base[h] * y[t - 1 - h, i]
             for k in range(own):
                 slope[i, k] = 0.0
         for k in range(count):
@@ -51,7 +60,9 @@ def run_free(u, y, s, lags, nk, terms, owner, theta, bound):  # noqa: PLR0912  #
             for i in range(ny):
                 for k in range(lags):
                     for j in range(ny):
-                        weight = slope[i, k * ny + j]
+                        weight = base[k] if i == j else 0.0
+                        for h in range(lags):
+                            weight += past[h, k] * slope[i, h * ny + j]
                         if weight != 0.0:
                             for p in range(count):
                                 s[t, i, p] += weight * s[t - 1 - k, j, p]

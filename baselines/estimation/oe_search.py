@@ -53,7 +53,7 @@ def estimate_oe(
         rows.append(Row.at(best, names, range(len(names)), samples))
         transfers.append(equation.transfer(best.theta))
         constants[i] = best.theta[-1] if constant else 0.0
-    return _assemble(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
+    return assemble_outputs(experiments[0].dt, shift, orders, tuple(rows), transfers, constants, samples)
 
 
 def oe_starts(
@@ -106,7 +106,7 @@ def _filter(experiments: Sequence[Experiment], shift: np.ndarray, f: np.ndarray)
     ]
 
 
-def _assemble(
+def assemble_outputs(
     dt: float,
     shift: np.ndarray,
     orders: Orders,
@@ -114,10 +114,11 @@ def _assemble(
     transfers: list,
     constants: np.ndarray,
     samples: int,
+    longest: int = 1,
 ) -> LinearFit:
-    """Assemble one polynomial model: A is diagonal with the common denominators, and C = A."""
+    """Assemble one polynomial model of `longest` coefficients or more: A holds the common denominators, and C = A."""
     ny, nu = orders.nb.shape
-    order = max(max(len(f), *map(len, numerators.values())) for f, numerators in transfers) - 1
+    order = max(longest, *(len(part) for f, numerators in transfers for part in (f, *numerators.values()))) - 1
     a, b = np.zeros((order + 1, ny, ny)), np.zeros((order + 1, ny, nu))
     for i, (f, numerators) in enumerate(transfers):
         a[: len(f), i, i] = f

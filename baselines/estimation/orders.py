@@ -1,4 +1,4 @@
-"""Orders na nb nc nk in the toolbox convention, for one or several inputs and outputs."""
+"""Orders na nb nc nd nf nk in the toolbox convention, for one or several inputs and outputs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Order = int | Sequence[Sequence[int]] | Sequence[int]
 
 @dataclass(frozen=True, eq=False)
 class Orders:
-    """na [ny, ny], nb [ny, nu], nk [ny, nu], nc [ny], nf [ny, nu]: how many past samples enter each equation.
+    """na [ny, ny], nb [ny, nu], nk [ny, nu], nc [ny], nf [ny, nu], nd [ny]: how many past samples enter each equation.
 
     A(q) = 1 + a_1 q^-1 + .. + a_na q^-na,  B(q) = b_1 q^-nk + .. + b_nb q^-(nk+nb-1),  C(q) = 1 + c_1 q^-1 + ..
     so that ARX321 is na = 3, nb = 2, nk = 1 and ARMAX2221 is na = nb = nc = 2, nk = 1 (Ljung 1999, section 4.2).
-    F(q) divides B(q) in an output-error model, which has neither A nor C.
+    F(q) divides B(q) in an output-error model, which has neither A nor C; D(q) divides C(q) in a Box-Jenkins model.
     """
 
     na: Int[np.ndarray, "ny ny"]
@@ -28,9 +28,20 @@ class Orders:
     nk: Int[np.ndarray, "ny nu"]
     nc: Int[np.ndarray, " ny"]
     nf: Int[np.ndarray, "ny nu"]
+    nd: Int[np.ndarray, " ny"]
 
     @classmethod
-    def of(cls, ny: int, nu: int, na: Order = 0, nb: Order = 0, nk: Order = 0, nc: Order = 0, nf: Order = 0) -> Orders:
+    def of(
+        cls,
+        ny: int,
+        nu: int,
+        na: Order = 0,
+        nb: Order = 0,
+        nk: Order = 0,
+        nc: Order = 0,
+        nf: Order = 0,
+        nd: Order = 0,
+    ) -> Orders:
         """Spread plain numbers over all pairs of channels. Raises UnusableInput for a wrong shape or sign."""
         orders = cls(
             na=_spread("na", na, (ny, ny)),
@@ -38,6 +49,7 @@ class Orders:
             nk=_spread("nk", nk, (ny, nu)),
             nc=_spread("nc", nc, (ny,)),
             nf=_spread("nf", nf, (ny, nu)),
+            nd=_spread("nd", nd, (ny,)),
         )
         if not (orders.na.any() or orders.nb.any()):
             raise UnusableInput("na and nb are both zero; a model needs at least one coefficient")
@@ -63,7 +75,7 @@ class Orders:
 
     def as_dict(self) -> dict[str, object]:
         """Give plain numbers where all channels agree, for tables and results."""
-        named = {"na": self.na, "nb": self.nb, "nc": self.nc, "nf": self.nf, "nk": self.nk}
+        named = {"na": self.na, "nb": self.nb, "nc": self.nc, "nd": self.nd, "nf": self.nf, "nk": self.nk}
         return {
             name: int(value.flat[0]) if np.all(value == value.flat[0]) else value.tolist()
             for name, value in named.items()

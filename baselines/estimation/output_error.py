@@ -116,7 +116,7 @@ class OutputError:
 
     def squares(self, theta: np.ndarray) -> float:
         """Compute |e|^2."""
-        return sum(float(np.vdot(run.counted, run.counted)) for run in self._runs(theta))
+        return sum(float(np.vdot(run.counted, run.counted)) for run in self.runs(theta))
 
     def cost(self, theta: np.ndarray) -> Cost:
         """Compute |e|^2, half its gradient and J' J."""
@@ -128,15 +128,15 @@ class OutputError:
         de/db_k = -q^-k u/F and de/df_k = q^-k (B/F) u/F (Ljung 1999, eq. 10.50). The start is eliminated by variable
         projection: e = P r with P = 1 - R pinv(R_n) over the first n samples (Golub and Pereyra 1973).
         """
-        for run in self._runs(theta):
-            n, jacobian = run.inverse.shape[1], self._jacobian(theta, run)
+        for run in self.runs(theta):
+            n, jacobian = run.inverse.shape[1], self.slopes(theta, run)
             jacobian -= jacobian[:, :, :n] @ run.inverse.T @ run.free.T
             if n < run.e.shape[1]:
                 self._add_change_of_fit(jacobian, theta, run)
                 jacobian = jacobian[:, :, n:]
             yield run.counted, jacobian
 
-    def _runs(self, theta: np.ndarray) -> Iterator[_Run]:
+    def runs(self, theta: np.ndarray) -> Iterator[Run]:
         """Simulate each batch from the start state that fits it best."""
         for u, y in zip(self.u, self.y, strict=True):
             filtered = {j: divide(u[:, :, j], f) for j, _, f, _ in self.split(theta)}
@@ -144,7 +144,7 @@ class OutputError:
             residual = y - np.sum(list(responses.values()), axis=0) - (theta[-1] if self.constant else 0.0)
             free, inverse = self._free_responses(theta, y.shape[1])
             start = residual[:, : inverse.shape[1]] @ inverse.T @ free.T
-            yield _Run(filtered, responses, free, inverse, start, residual - start)
+            yield Run(filtered, responses, free, inverse, start, residual - start)
 
     def _free_responses(self, theta: np.ndarray, length: int) -> tuple[np.ndarray, np.ndarray]:
         """Compute R [T, N] and the pseudo-inverse [N, n] of its first n_start rows."""
@@ -152,7 +152,7 @@ class OutputError:
         free = divide(np.eye(self.state, length), common).T
         return free, np.linalg.pinv(free[: self.n_start], rcond=1e-10)
 
-    def _jacobian(self, theta: np.ndarray, run: _Run) -> np.ndarray:
+    def slopes(self, theta: np.ndarray, run: Run) -> np.ndarray:
         """Compute de/dtheta [p, B, T] at a fixed z, whose response rings through every F as the others do."""
         jacobian = np.zeros((self.n_params, *run.e.shape))
         length = run.e.shape[1]
@@ -167,7 +167,7 @@ class OutputError:
             jacobian[-1] = -1.0
         return jacobian
 
-    def _add_change_of_fit(self, jacobian: np.ndarray, theta: np.ndarray, run: _Run) -> None:
+    def _add_change_of_fit(self, jacobian: np.ndarray, theta: np.ndarray, run: Run) -> None:
         """Add the part of dz/df that the misfit of the first n samples causes: -R (R_n' R_n)^-1 dR_n' misfit."""
         n = run.inverse.shape[1]
         misfit = run.e[:, :n]
@@ -179,7 +179,7 @@ class OutputError:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class Run:
     """The simulation of one batch, and what its Jacobian needs of it."""
 
     filtered: dict[int, Float[np.ndarray, "B T"]]  # u/F of each input

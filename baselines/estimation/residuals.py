@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import solve_toeplitz
 
+from simgap.baselines.estimation.box_jenkins_error import BoxJenkinsError
 from simgap.baselines.estimation.filters import divide
 from simgap.baselines.estimation.fitted import LinearFit
 from simgap.baselines.estimation.gram import lagged_gram
@@ -81,12 +82,16 @@ def _of_output(
 
 def _aligned(fit: LinearFit, experiments: Sequence[Experiment], output: int) -> Iterator[tuple]:
     """Yield e [T], Jacobian [p, T] and u [T, nu] of each experiment, over the same samples, until there are enough."""
-    model, before = fit.polynomial, int(fit.orders.nc[output])
+    model, before = fit.polynomial, 0
     shift = np.concatenate((model.y_mean, model.u_mean))
-    if fit.orders.nf.any():
+    equation: BoxJenkinsError | OutputError | PredictionError
+    if fit.orders.nd.any() or (fit.orders.nf.any() and fit.orders.nc.any()):
+        equation = BoxJenkinsError.of(experiments, shift, fit.orders, output, True)
+    elif fit.orders.nf.any():
         equation = OutputError.of(experiments, shift, fit.orders, output, True, None)
     else:
         equation = PredictionError.of(lagged_gram(experiments, shift, fit.orders.max_lag), fit.orders, output, True)
+        before = equation.nc
     theta = equation.theta_of(fit.rows[output])
     seen = 0
     for (e, jacobian), u in zip(equation.linearised(theta), equation.u, strict=True):

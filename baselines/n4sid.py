@@ -1,0 +1,105 @@
+"""Subspace identification of a state-space model, refined by simulation error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+from threadpoolctl import threadpool_limits
+
+from simgap.baselines.estimation.batches import excerpt
+from simgap.baselines.estimation.equation_error import check_length
+from simgap.baselines.estimation.levenberg import minimise
+from simgap.baselines.estimation.linear import simplest
+from simgap.baselines.estimation.state_space import StateSpace
+from simgap.baselines.estimation.state_space_error import StateSpaceError
+from simgap.baselines.estimation.subspace import state_spaces, with_spread
+from simgap.records import Experiment, TrainingSet
+from simgap.registry import MODELS
+
+if TYPE_CHECKING:
+    import control
+
+EXCERPT = 8192  # samples to compare orders on
+COARSE, FINAL = 30, 60  # steps of the refinement
+
+
+@MODELS.register("n4sid")
+@dataclass
+class N4sid:
+    """x(t+1) = A x(t) + B u(t), y(t) = C x(t) + D u(t) + e(t), by subspace projections, then by simulation error.
+
+    Every order up to max_order is estimated with the weightings of N4SID, MOESP and CVA (Van Overschee and De Moor,
+    Automatica 30, 1994, and 31, 1995) from `horizon` past and future samples; the best of each order is refined by
+    Levenberg-Marquardt over all elements of the matrices (McKelvey, Helmersson and Ribarits 2004), and the free run
+    over held-out records chooses the order. With order given, nothing is chosen but the weighting.
+    """
+
+    parts: ClassVar = (StateSpace,)  # records in a saved model
+
+    order: int | None = None
+    max_order: int = 8
+    horizon: int = 20
+    model: StateSpace = field(init=False, repr=False)
+
+    @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        """Choose the order on train and valid, then estimate on both together; nothing here is random."""
+        orders = [self.order] if self.order else list(range(1, self.max_order + 1))
+        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        if not held_out:
+            check_length(0, 1, data.n_init)
+        records = excerpt(data.train, EXCERPT)
+        channels = len(data.channels.inputs) + len(data.channels.outputs)
+        longest = max(map(len, records))
+        horizon = min(self.horizon, max(longest // (4 * channels), 2))
+        check_length(sum(max(len(x) - 2 * horizon, 0) for x in records), 2 * horizon * channels, 2 * horizon)
+        size = np.concatenate([x.y for x in data.train]).std(axis=0)
+        size[size == 0] = 1.0
+
+        def refined(model: StateSpace, experiments: Sequence[Experiment], steps: int) -> StateSpace:
+            equation = StateSpaceError.of(model, experiments, data.n_init, size)
+            if not equation.records:
+                return model
+            return with_spread(equation.at(minimise(equation, equation.theta, steps).theta), experiments, data.n_init)
+
+        def error(model: StateSpace) -> float:
+            equation = StateSpaceError.of(model, held_out, data.n_init, size)
+            return float(np.sqrt(equation.squares(equation.theta) / max(equation.samples, 1)))
+
+        best: dict[int, tuple[float, StateSpace]] = {}
+        for model in state_spaces(records, orders, horizon):
+            tried = error(model), model
+            if model.order not in best or tried[0] < best[model.order][0]:
+                best[model.order] = tried
+        for order, (before, model) in best.items():
+            after = refined(model, records, COARSE)
+            if (now := error(after)) < before:
+                best[order] = now, after
+        models = [model for _, model in best.values()]
+        chosen = simplest(models, [model.order for model in models], held_out, data.n_init)
+        self.model = refined(models[chosen], [*data.train, *data.valid], FINAL)
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Run free from the state that the first n samples show."""
+        return self.model.simulate(u, y_init)
+
+    @property
+    def n_params(self) -> int:
+        """How many numbers are left when the coordinates of the states are fixed, with a constant per output."""
+        (ny, nu), n = self.model.d.shape, self.model.order
+        return n * (nu + ny) + ny * nu + ny
+
+    @property
+    def fitted(self) -> dict[str, Any]:
+        """The order."""
+        return {"order": self.model.order}
+
+    def to_control(self) -> control.StateSpace:
+        """Convert to python-control, for deviations from the operating point."""
+        return self.model.to_control()
