@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simgap.records import Dataset
-from simgap.reports import confusion
+from simgap.reports import confusion, recovery
 from simgap.reports.diagnosis.traces import axis_range, thin
 from simgap.reports.latex import to_latex
-from simgap.reports.leaderboard import read_suites, tables_of
+from simgap.reports.leaderboard import all_tables, read_suites
 from simgap.reports.pooling import Standing
-from simgap.reports.site import recovery
 from simgap.reports.site.collection import Collection, Run
 from simgap.reports.site.names import file_names
 
@@ -44,8 +43,8 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
     if not public and not (out / ".gitignore").exists():
         (out / ".gitignore").write_text("*\n", encoding="utf-8")  # they may hold samples that are not ours to give
     written = []
-    for suite, rows in collection.suites.items():
-        tables = {f"{suite}-{table.title}": table for table in tables_of(rows)}
+    for suite, listed in all_tables(folder, collection.suites).items():
+        tables = {f"{suite}-{table.title}": table for table in listed}
         for title, name in file_names(tables).items():
             written.append(out / f"{name}.tex")
             written[-1].write_text(to_latex(tables[title]), encoding="utf-8")
@@ -62,8 +61,8 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
             ]  # fmt: skip
             if runs and copy is not None:
                 written += _saved(_free_run(runs[:OVERLAID], copy), out / f"{name}-free-run")
-    if cases := recovery.read(folder):
-        written += _saved(confusion.drawn(cases["counts"]), out / "recovery-confusion")
+    if counts := recovery.read(folder).get("counts"):
+        written += _saved(confusion.drawn(counts), out / "recovery-confusion")
     return written
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from simgap.records import Result, UnusableInput
+from simgap.reports import recovery
 from simgap.reports.modes import modes_table
 from simgap.reports.paper.claims import claims, claims_table
 from simgap.reports.paper.tables import of_paper, paper_tables
@@ -16,7 +17,7 @@ from simgap.reports.rendering import escape, to_markdown
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
-NO_SUITES = ("recovery", "artefacts", "site", "figures")  # what else stands in a folder of results
+NO_SUITES = (recovery.FOLDER, "artefacts", "site", "figures")  # what else stands in a folder of results
 FEW = 2  # data sets, whose figures are shown after a run
 
 HOW_TO_READ = (
@@ -29,11 +30,14 @@ HOW_TO_READ = (
 
 @dataclass(frozen=True)
 class Report:
-    """The tables of each suite, and the files they were written to."""
+    """The tables of each suite and of the recovery study, and the files they were written to.
+
+    `csv` holds the rows of the models; None where there are none.
+    """
 
     tables: dict[str, list[Table]]
     markdown: Path
-    csv: Path
+    csv: Path | None
 
 
 def report(folder: str | Path = "results") -> Report:
@@ -43,12 +47,22 @@ def report(folder: str | Path = "results") -> Report:
     """
     folder = Path(folder)
     suites = read_suites(folder)
-    tables = {suite: tables_of(results) for suite, results in suites.items()}
-    markdown, csv = folder / "leaderboard.md", folder / "results.csv"
+    tables = all_tables(folder, suites)
+    markdown = folder / "leaderboard.md"
     markdown.write_text(_page(tables), encoding="utf-8")
     frames = [tidy(results).assign(suite=suite) for suite, results in suites.items()]
+    if not frames:
+        return Report(tables, markdown, None)
+    csv = folder / "results.csv"
     pd.concat(frames).to_csv(csv, index=False)
     return Report(tables, markdown, csv)
+
+
+def all_tables(folder: Path, suites: dict[str, list[Result]]) -> dict[str, list[Table]]:
+    """Make the tables of each suite and, under the name of its folder, of the recovery study."""
+    tables = {suite: tables_of(results) for suite, results in suites.items()}
+    study = recovery.tables(folder)
+    return tables | ({recovery.FOLDER: study} if study else {})
 
 
 def tables_of(results: list[Result]) -> list[Table]:
@@ -72,13 +86,16 @@ def _of_datasets(results: list[Result]) -> list[Table]:
 
 
 def read_suites(folder: Path) -> dict[str, list[Result]]:
-    """Read the rows of all suites in a folder of results. Raises UnusableInput."""
+    """Read the rows of all suites in a folder of results; none where it holds a recovery study only.
+
+    Raises UnusableInput where it holds neither.
+    """
     if not folder.is_dir():
         raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one")
     inside = sorted(path for path in folder.iterdir() if path.is_dir() and path.name not in NO_SUITES)
     folders = [folder, *inside]
     suites = {path.resolve().name: rows for path in folders if (rows := store.read(path))}
-    if not suites:
+    if not suites and not recovery.read(folder):
         raise UnusableInput(f"{folder} holds no results; `simgap run` makes them")
     return suites
 
@@ -92,7 +109,7 @@ ABOUT_SUITE = {
 def _page(tables: dict[str, list[Table]]) -> str:
     parts = ["# Leaderboard\n", HOW_TO_READ + "\n"]
     for suite, listed in tables.items():
-        parts.append(f"## Suite {escape(suite)}\n")
+        parts.append("## Recovery study\n" if suite == recovery.FOLDER else f"## Suite {escape(suite)}\n")
         parts += [f"{ABOUT_SUITE[suite]}\n"] if suite in ABOUT_SUITE else []
         parts += [to_markdown(table, level=3) for table in listed]
     return "\n".join([*parts, published_markdown()])

@@ -9,13 +9,14 @@ from pathlib import Path
 from simgap.data import describe
 from simgap.records import UnusableInput
 from simgap.registry import MODELS
+from simgap.reports import recovery
 from simgap.reports.leaderboard import ABOUT_SUITE, HOW_TO_READ, read_suites
 from simgap.reports.modes import WINDOWED, modes_table
 from simgap.reports.paper.claims import claims, claims_table
 from simgap.reports.paper.tables import NAMES, of_paper, paper_tables
 from simgap.reports.pooling import Standing
 from simgap.reports.published import WARNING, published_tables
-from simgap.reports.site import diagnoses, recovery, runs, signals
+from simgap.reports.site import diagnoses, runs, signals
 from simgap.reports.site.collection import Collection, Run, group_of
 from simgap.reports.site.diagnoses import MARK
 from simgap.reports.site.fit_charts import horizon_charts, training_chart
@@ -81,7 +82,8 @@ class _Site:
         self.writer = Writer(folder, self._menu())
 
     def _menu(self) -> list[tuple[str, str]]:
-        menu = [("index.html", "Leaderboard"), ("datasets.html", "Data sets"), ("models.html", "Models")]
+        menu = [("index.html", "Leaderboard")]
+        menu += [("datasets.html", "Data sets"), ("models.html", "Models")] if self.collection.suites else []
         menu += [("paper.html", "The paper")] if self.paper else []
         menu += [("recovery.html", "Recovery study")] if self.cases else []
         menu += [("diagnoses.html", "Diagnoses")] if self.found else []
@@ -95,7 +97,8 @@ class _Site:
             self._dataset(name)
         for label in self.collection.models:
             self._model(label)
-        self._lists()
+        if self.collection.suites:
+            self._lists()
         self._others()
 
     def _links(self, root: str) -> tuple[dict[str, str], dict[str, str]]:
@@ -114,7 +117,7 @@ class _Site:
                 "paper": of_paper(rows),
             })  # fmt: skip
         self.writer.page(
-            "index.html", "index.html", suites=suites, how_to_read=HOW_TO_READ,
+            "index.html", "index.html", suites=suites, how_to_read=HOW_TO_READ if suites else "",
             model_links=models, dataset_links=datasets,
         )  # fmt: skip
 

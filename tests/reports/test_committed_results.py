@@ -9,11 +9,14 @@ import pytest
 from simgap.data import available, load
 from simgap.registry import DATASETS
 from simgap.reports.leaderboard import report
+from simgap.reports.recovery_rates import rate_tables
+from simgap.reports.rendering import to_markdown
 from simgap.results import store
 from simgap.running.suites import load_suite, suite_names
 
 RESULTS = Path(__file__).parents[2] / "reports" / "results"
 FILES = sorted(RESULTS.glob("*/*.jsonl"))
+RATES = RESULTS / "recovery" / "rates.json"
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +50,15 @@ def test_they_come_from_the_measured_data_that_are_at_hand(rows):
 
 
 def test_the_leaderboard_is_what_the_results_say(tmp_path):
-    for file in FILES:
+    for file in (*FILES, RATES):
         (tmp_path / file.parent.name).mkdir(exist_ok=True)
         shutil.copy(file, tmp_path / file.parent.name)
     written = report(tmp_path).markdown.read_text(encoding="utf-8")
     assert written == (RESULTS / "leaderboard.md").read_text(encoding="utf-8")
+
+
+def test_the_page_on_the_recovery_benchmark_shows_the_rates_that_are_stored():
+    page = (RESULTS.parents[1] / "docs" / "recovery.md").read_text(encoding="utf-8")
+    right, invented, _ = rate_tables(json.loads(RATES.read_bytes()))
+    assert to_markdown(right, 3) in page
+    assert to_markdown(invented, 3) in page
