@@ -9,8 +9,23 @@ from typing import Annotated
 import typer
 
 import simgap
-from simgap.cli import check, data, diagnose, export, fit, new_model, range_test, report, run, simulate, try_model
+from simgap.cli import (
+    check,
+    data,
+    diagnose,
+    export,
+    fit,
+    new_model,
+    range_test,
+    recovery,
+    report,
+    run,
+    simulate,
+    try_model,
+)
 from simgap.cli import list as catalogue
+from simgap.cli import next as next_command
+from simgap.cli import open as opening
 from simgap.records import UnusableInput
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -18,6 +33,8 @@ app.command("run")(run.run)
 app.command("report")(report.report)
 app.command("list")(catalogue.show)
 app.command("diagnose")(diagnose.diagnose)
+app.command("open")(opening.open_page)
+app.command("next")(next_command.next_record)
 app.command("fit")(fit.fit)
 app.command("simulate")(simulate.simulate)
 app.command("export")(export.export)
@@ -26,6 +43,7 @@ app.command("check")(check.check)
 app.command("new-model")(new_model.new_model)
 app.command("try-model")(try_model.try_model)
 app.add_typer(data.app, name="data")
+app.add_typer(recovery.app, name="recovery")
 
 
 @app.callback(invoke_without_command=True)

@@ -65,6 +65,24 @@ def parse_kinds(pairs: Sequence[str]) -> str | dict[str, str] | None:
     return kinds or None
 
 
+def parse_limits(option: str, given: Sequence[str], count: int) -> Any:
+    """["-5,5"] as (-5, 5), ["u=40"] as {"u": 40}: so many numbers each; None for none. Raises UnusableInput."""
+    limits: dict[str, Any] = {}
+    for text in given:
+        name, _, numbers = text.rpartition("=")
+        try:
+            values = [float(number) for number in numbers.split(",")]
+        except ValueError:
+            values = []
+        if len(values) != count:
+            form = "LOW,HIGH" if count == 2 else "a number"
+            raise UnusableInput(f"--{option} {text}: write {form}, or NAME={form} where there are several columns")
+        if name.strip() in limits or "" in limits or (limits and not name.strip()):
+            raise UnusableInput(f"--{option} {text}: say once of which column each limit is, as NAME=..")
+        limits[name.strip()] = tuple(values) if count > 1 else values[0]
+    return limits.get("", limits or None)
+
+
 def read_data(
     data: str,
     inputs: Sequence[str] | None = None,

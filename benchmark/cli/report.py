@@ -21,6 +21,7 @@ def report(
     from rich.console import Console
 
     from simgap.reports import leaderboard
+    from simgap.reports.recovery import FOLDER
     from simgap.reports.rendering import to_rich
     from simgap.reports.site.site import check_free, write_site
 
@@ -30,10 +31,10 @@ def report(
     written = leaderboard.report(folder)
     console = Console()
     for suite, tables in written.tables.items():
-        console.rule(suite, align="left")
+        console.rule("recovery study" if suite == FOLDER else suite, align="left")
         for table in tables:
             console.print(to_rich(table, console.width))
-    typer.echo(f"Written: {written.markdown} and {written.csv}")
+    typer.echo(f"Written: {' and '.join(str(file) for file in (written.markdown, written.csv) if file)}")
     if figures:
         from simgap.reports.figures import write_figures
 

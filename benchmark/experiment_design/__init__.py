@@ -1,0 +1,1 @@
+"""Design of the record that tells apart what the records at hand leave undecided."""

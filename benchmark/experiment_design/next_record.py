@@ -1,0 +1,85 @@
+"""`simgap.next_record`: what the records leave undecided, and the record that would decide it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from simgap.cores import all_cores
+from simgap.data.formats.plant_table import with_known
+from simgap.data.kinds import with_kinds
+from simgap.data.loading import read
+from simgap.diagnosis import doubts
+from simgap.experiment_design.answer import CERTAIN, NextRecord, is_alike
+from simgap.experiment_design.limits import Limits, Range, limits_of
+from simgap.experiment_design.rivals import Question, question_of
+from simgap.experiment_design.search import Design, best_record
+from simgap.greybox.identification import Identified, identify
+from simgap.records import Channels, Dataset
+
+
+def next_record(
+    data: Any,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    dt: float | None = None,
+    seed: int = 0,
+    kind: str | Mapping[str, str] | None = None,
+    known: Mapping[str, Any] | None = None,
+    input_range: Range | Mapping[str, Range] | None = None,
+    rate: float | Mapping[str, float] | None = None,
+    seconds: float | None = None,
+    travel: Range | Mapping[str, Range] | None = None,
+) -> NextRecord:
+    """Name the models that training and validation records do not tell apart, and design the record that would.
+
+    `data`, `inputs`, `outputs`, `dt`, `kind` and `known` as in `simgap.diagnose`. Limits of the record: the range of
+    the input, its rate (in its unit per second), its length in seconds, and the travel of the output; where there are
+    several inputs or outputs, by their names. What is left out is taken from the training records. `seed` draws the
+    signals that are tried. Raises UnusableInput.
+    """
+    dataset = data if isinstance(data, Dataset) else read(data, inputs, outputs, dt).dataset
+    dataset = with_known(with_kinds(dataset, kind), known)
+    limits = limits_of(dataset, input_range, rate, seconds, travel)
+    training, channels = dataset.training, dataset.channels
+    doubt = doubts.shows_controller((*training.train, *training.valid), channels)
+    if doubt:
+        return NextRecord(dataset.name, channels, limits, (), None, doubt=doubt)
+    with all_cores():
+        identified = identify(training)
+        questions = [question_of(one) for one in identified]
+        design, wider = None, {}
+        if any(question.pairs for question in questions):
+            design = best_record(questions, limits, seed)
+            rivals = any(question.pairs and not question.interval for question in questions)
+            if rivals and (design is None or design.chance < CERTAIN):
+                wider = _wider(questions, limits, design, seed)
+    return NextRecord(dataset.name, channels, limits, tuple(questions), design, wider, _untold(identified, channels))
+
+
+def _wider(questions: Sequence[Question], limits: Limits, design: Design | None, seed: int) -> dict[str, Design | None]:
+    """Design records with each limit, and with all, twice as wide, coarsely; only with all where that is all there is.
+
+    Where nothing within all limits twice as wide sets an undecided pair apart, no single limit does.
+    """
+    wider = limits.relaxed()
+    widest = {"all limits": best_record(questions, wider.pop("all limits"), seed, rounds=1)}
+    designs = [one for one in (design, *widest.values()) if one is not None]
+    undecided = [one for one in (design.separated if design else ()) if one.chance < CERTAIN]
+    if design is not None and all(is_alike(one, designs) for one in undecided):
+        return widest
+    return {name: best_record(questions, more, seed, rounds=1) for name, more in wider.items()} | widest
+
+
+def _untold(identified: Sequence[Identified], channels: Channels) -> str:
+    """Say what no record of these columns can tell."""
+    plant = identified[0].plant.estimate.plant
+    known = channels.plant
+    moves = plant.kind in ("position", "velocity") and not plant.imposed
+    constants = (known.mass, known.inertia) if known is not None else ()
+    if not moves or any(constant is not None and (constant.certain or constant.column) for constant in constants):
+        return ""
+    return (
+        "No record of these columns tells a gain from an inertia: they show gain over inertia, and nothing else. What "
+        "would: a known mass or inertia (--known mass=.. or a table [plant]), or a measured force."
+    )
