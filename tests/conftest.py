@@ -12,6 +12,8 @@ INSIDE_A_FIT = (
     "greybox.fitting", "greybox.problem", "greybox.simulation", "greybox.plant", "greybox.levenberg",
     "baselines.estimation.blocks", "baselines.estimation.block_error", "baselines.estimation.block_search",
     "baselines.estimation.filters", "baselines.estimation.levenberg", "baselines.estimation.narx_error",
+    "baselines.estimation.box_jenkins_error", "baselines.estimation.output_error",
+    "baselines.estimation.state_space", "baselines.estimation.state_space_error", "baselines.estimation.thresholding",
 )  # fmt: skip
 
 

@@ -6,13 +6,14 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
            "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
 
-GROUND = {"records", "known_plant", "protocol", "registry", "step_form", "cores"}
+GROUND = {"records", "known_plant", "protocol", "registry", "step_form", "cores", "stages"}
 RUN = {"metrics", "tasks", "results", "running"}
 # Room or module -> what it may import besides itself. "simgap" is the lazy exports of the package.
 MAY_IMPORT: dict[str, set[str]] = {
     "known_plant": set(),
     "records": {"known_plant"},
     "cores": set(),
+    "stages": set(),
     "their_simulation": set(),
     "findings": {"records", "their_simulation"},
     "wording": set(),
@@ -35,10 +36,16 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reports": {"records", "registry", "metrics", "results", "data", "findings", "wording", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "their_simulation", "data", "greybox", "error_views", "reports"},
-    "simgap": GROUND | RUN | {"data", "diagnosis", "exports", "reports", "saved"},
+    "recovery": GROUND | RUN | {"findings", "data", "diagnosis"},
+    "experiment_design": GROUND | {"data", "diagnosis", "greybox", "wording"},
+    "simgap": GROUND | RUN | {"data", "diagnosis", "experiment_design", "exports", "reports", "saved"},
+    # The page of `simgap open` does what the command line does, for one record at a time.
+    "app": GROUND | {"data", "diagnosis", "reports", "saved", "wording"},
     "cli": GROUND
     | RUN
-    | {"contract", "exports", "findings", "data", "greybox", "diagnosis", "reports", "saved", "simgap"},
+    | {"app", "contract", "experiment_design", "exports", "findings", "data", "greybox", "diagnosis", "recovery"}
+    | {"reports", "saved"}
+    | {"simgap"},
 }
 
 
