@@ -9,10 +9,12 @@ from jaxtyping import install_import_hook
 
 # Called a hundred thousand times by one search; checks would make them five times as slow.
 INSIDE_A_FIT = (
-    "greybox.fitting", "greybox.problem", "greybox.simulation", "greybox.plant", "greybox.levenberg",
-    "baselines.estimation.blocks", "baselines.estimation.block_error", "baselines.estimation.block_search",
-    "baselines.estimation.filters", "baselines.estimation.levenberg", "baselines.estimation.narx_error",
-    "baselines.estimation.box_jenkins_error", "baselines.estimation.output_error",
+    "greybox.fitting", "greybox.levenberg", "greybox.machine", "greybox.noise", "greybox.normal_equations",
+    "greybox.plant", "greybox.problem", "greybox.samples", "greybox.simulation", "greybox.terms", "greybox.two_masses",
+    "baselines.estimation.block_error", "baselines.estimation.block_search", "baselines.estimation.blocks",
+    "baselines.estimation.box_jenkins_error", "baselines.estimation.filters", "baselines.estimation.gram",
+    "baselines.estimation.levenberg", "baselines.estimation.monomials", "baselines.estimation.narx_error",
+    "baselines.estimation.output_error", "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
     "baselines.estimation.state_space", "baselines.estimation.state_space_error", "baselines.estimation.thresholding",
 )  # fmt: skip
 
