@@ -134,6 +134,12 @@ class Cause:
     deciding_experiment: str = ""
     holds: Holds | None = None
     simulated: dict[str, float] = field(default_factory=dict)
+    output: str = ""  # whose plant it was found in, where the outputs have plants of their own
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Effect, channel and output; an answer has each cause once."""
+        return self.effect, self.channel, self.output
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +270,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "title": cause.title,
         "text": cause.text,
         "channel": cause.channel,
+        "output": cause.output,
         "evidence": cause.evidence,
         "gain": cause.gain,
         "log_likelihood_ratio": cause.log_likelihood_ratio,

@@ -67,8 +67,8 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
         suspected = suspected or Promise((), found, (), model, after, gain)
         if gain.low > 0:
             causes = found if count == len(listed) else _causes(kept, profiles)
-            named = {(cause.effect, cause.channel) for cause in causes}
-            rest = tuple(cause for cause in found if (cause.effect, cause.channel) not in named)
+            named = {cause.key for cause in causes}
+            rest = tuple(cause for cause in found if cause.key not in named)
             return Promise(causes, rest, tuple(kept), model, after, gain)
     assert suspected is not None, "there is something to promise"
     return suspected

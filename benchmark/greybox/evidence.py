@@ -134,6 +134,7 @@ class Evidence:
             shows_in=effect.shows_in,
             profiles=self._profiles(term) if profiles else (),
             deciding_experiment=deciding_experiment(effect, confounded, baseline.plant.kind),
+            output=self._output,
         )  # fmt: skip
 
     def _outlier_cause(self, outliers: Outliers) -> Cause:
@@ -151,7 +152,7 @@ class Evidence:
             effect.reference, self._channel(term),
             evidence=outliers.share, gain=outliers.share, log_likelihood_ratio=outliers.log_likelihood_ratio,
             parameters=values, per_experiment=effect.per_experiment, shows_in=effect.shows_in,
-            deciding_experiment=deciding_experiment(effect, (), baseline.plant.kind),
+            deciding_experiment=deciding_experiment(effect, (), baseline.plant.kind), output=self._output,
         )  # fmt: skip
 
     def _values(self, term: Term) -> tuple[Value, ...]:
@@ -181,6 +182,12 @@ class Evidence:
                 behind = self.selection.trial.score - trial.score
                 rivals.append(Rival(new[0].effect, gained(without, trial), behind))
         return rivals
+
+    @property
+    def _output(self) -> str:
+        """The first output of the plant; empty where it has all of them."""
+        outputs = self.identified.plant.outputs
+        return self.channels.outputs[outputs[0]].name if len(outputs) < len(self.channels.outputs) else ""
 
     def _channel(self, term: Term) -> str:
         """The name of the input or output that an effect sits on; empty for a force."""

@@ -88,7 +88,7 @@ def _traces(findings: Findings, plots: _Plots) -> list[dict[str, Any]]:
 
 def _cause(cause: Cause, findings: Findings, plots: _Plots, shown: set[int]) -> dict[str, Any]:
     """Describe one cause with its plots. A view stands beside the first cause that it shows; `shown` collects them."""
-    sensed = cause.channel if cause.channel in findings.units else ""
+    sensed = cause.channel if cause.channel in findings.units else cause.output
     showing = [v for v in words.beyond_chance(findings) if words.shows(v, cause) and sensed in ("", v.output)]
     views = [view for view in showing if id(view) not in shown][:VIEWS]
     above = [view for view in showing if id(view) in shown]

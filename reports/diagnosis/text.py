@@ -101,7 +101,7 @@ def _cause(cause: Cause, findings: Findings) -> Iterator[str]:
 
 def _absolute(budget: Budget, findings: Findings) -> list[str]:
     """List the mean absolute error of a known machine with ever more of its causes."""
-    unit, titles = findings.units[budget.output], words.titles_of(findings)
+    unit, titles = findings.units[budget.output], words.titles_of(findings, budget.output)
     milli = unit in ("rad", "m")
     return [
         f"{value * (1000 if milli else 1):6.3g} {'m' * milli}{unit}  "

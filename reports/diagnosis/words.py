@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from simgap.findings import Budget, Cause, Findings, Wrong
 from simgap.reports.diagnosis import their_simulation
@@ -56,9 +57,15 @@ def _listed(causes: Sequence[Cause], findings: Findings) -> str:
 
 
 def cause_title(cause: Cause, findings: Findings) -> str:
-    """Name a cause by its title, with the channel where there are several to choose from."""
+    """Name a cause by its title, with the channel, and the output of its plant, where there are several to choose from.
+
+    Coulomb friction (position); input saturation (valve, in flow).
+    """
     several = len(findings.inputs) > 1 or len(findings.units) > 1
-    return f"{cause.title} ({cause.channel})" if cause.channel and several else cause.title
+    places = [cause.channel] if cause.channel and several else []
+    if cause.output and cause.output != cause.channel:
+        places.append(f"in {cause.output}")
+    return f"{cause.title} ({', '.join(places)})" if places else cause.title
 
 
 def evidence(cause: Cause) -> str:
@@ -107,18 +114,19 @@ def runner_up(findings: Findings) -> str:
     return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
 
 
-def titles_of(findings: Findings) -> dict[str, str]:
-    """Map the names of causes in a budget to their titles."""
-    titles = {cause.effect: cause_title(cause, findings) for cause in findings.causes}
+def titles_of(findings: Findings, output: str) -> dict[str, str]:
+    """Map the names of causes in an output's budget to their titles."""
+    causes = [replace(cause, output="") for cause in findings.causes if cause.output in ("", output)]
+    titles = {cause.effect: cause_title(cause, findings) for cause in causes}
     titles["linear_part"] = "numbers of the linear part"
-    return titles | {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in findings.causes}
+    return titles | {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in causes}
 
 
 def parts_of(budget: Budget, findings: Findings) -> list[tuple[str, float | None]]:
     """List the parts of an error budget with their shares: the causes, then what is left; empty where there is none."""
     if not math.isfinite(budget.unexplained):
         return []
-    titles = titles_of(findings)
+    titles = titles_of(findings, budget.output)
     return [
         *((titles.get(name, name), share) for name, share in budget.causes.items()),
         ("learnable from the input, without a name", budget.learnable),

@@ -144,7 +144,11 @@ def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():
         "two", TrainingSet((record[:500],), (record[500:700],), 10, channels), (record[700:],), 10, channels
     )
     diagnosis = diagnose(dataset)
-    assert {(cause.effect, cause.channel) for cause in diagnosis.causes} == {("input_saturation", "valve")}
+    found = {(cause.effect, cause.channel, cause.output) for cause in diagnosis.causes}
+    assert found == {("input_saturation", "valve", "left"), ("input_saturation", "valve", "right")}
+    text = " ".join(str(diagnosis).split())
+    assert all(f"saturation of the actuator (valve, in {name})" in text for name in ("left", "right"))
+    assert "at valve, in left" in " ".join(diagnosis.to_html().split())
 
 
 @pytest.mark.parametrize("effect", ["dead_zone", "coulomb_friction"])
