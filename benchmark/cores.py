@@ -31,23 +31,27 @@ def cores() -> int:
 
 @contextmanager
 def all_cores() -> Iterator[None]:
-    """Have `on_cores` use all cores within this block.
+    """Have `on_cores` use all cores within this block, and linear algebra one thread.
 
-    Its processes are forked from this one when they are first needed, so that they import nothing. Threads gain
-    nothing here: half of their time goes by between two compiled loops. Only the main process of a program forks, and
-    only on Linux.
+    Its threads wait for each other by spinning, for very long where other programs have the cores. The processes of
+    `on_cores` are forked from this one when they are first needed, so that they import nothing. Threads gain nothing
+    here: half of their time goes by between two compiled loops. Only the main process of a program forks, and only on
+    Linux.
     """
+    from threadpoolctl import threadpool_limits
+
     count = min(MOST, cores())
-    if count < 2 or sys.platform != "linux" or multiprocessing.parent_process() is not None or _pool.get():
-        yield
-        return
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("fork"), _begin)
-    before = _pool.set(pool)
-    try:
-        yield
-    finally:
-        _pool.reset(before)
-        pool.shutdown(cancel_futures=True)
+    with threadpool_limits(1):
+        if count < 2 or sys.platform != "linux" or multiprocessing.parent_process() is not None or _pool.get():
+            yield
+            return
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("fork"), _begin)
+        before = _pool.set(pool)
+        try:
+            yield
+        finally:
+            _pool.reset(before)
+            pool.shutdown(cancel_futures=True)
 
 
 def on_cores(work: Callable[[T], R], items: Sequence[T]) -> list[R]:

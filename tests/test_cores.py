@@ -5,6 +5,7 @@ import signal
 import sys
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from simgap.cores import all_cores, cores, on_cores
 from simgap.data.simulated.rigs import hide
@@ -50,6 +51,15 @@ def test_outside_of_all_cores_and_on_one_core_everything_runs_here(monkeypatch):
     monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
     with all_cores():
         assert on_cores(process_of, [1, 2]) == [(1, MAIN), (2, MAIN)]
+
+
+def test_linear_algebra_has_one_thread_within_all_cores_and_its_own_number_after(monkeypatch):
+    for count in ("1", "2"):
+        monkeypatch.setenv("NUMBA_NUM_THREADS", count)
+        with threadpool_limits(2):
+            with all_cores():
+                assert {library["num_threads"] for library in threadpool_info()} == {1}
+            assert {library["num_threads"] for library in threadpool_info()} == {2}
 
 
 def test_a_piece_does_its_own_pieces_itself():

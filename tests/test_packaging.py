@@ -118,7 +118,7 @@ def test_it_runs_in_a_clean_environment_beside_a_foreign_package_called_baseline
     assert Path(file).is_relative_to(site)
 
     rng = np.random.default_rng(0)
-    np.savetxt(work / "my.csv", rng.normal(size=(200, 2)), delimiter=",", header="u,y", comments="")
+    np.savetxt(work / "my.csv", rng.normal(size=(400, 2)), delimiter=",", header="u,y", comments="")
     columns = ("--input", "u", "--output", "y", "--dt", "0.1")
     run(bin / "simgap", "run", "smoke", "--datasets", "my.csv", *columns, "--out", "results", cwd=work)
     printed = run(bin / "simgap", "report", "results", cwd=work)

@@ -1,7 +1,8 @@
 """README.md and the pages of docs/ do what they say: their blocks are run in a folder with the files that they name.
 
 A comment above a block says what the block is: `<!-- file NAME -->` is the content of a file, `<!-- not run -->` is for
-make, which would run these tests again. Other blocks of sh and python are run as they stand.
+make, which would run these tests again. Other blocks of sh and python are run as they stand, those under
+`<!-- slow -->` by make test-slow.
 """
 
 import os
@@ -34,8 +35,8 @@ BLOCKS = [Block(*match.groups()) for page in PAGES for match in BLOCK.finditer(p
 FILES = {mark.removeprefix("file "): text for mark, _, text in BLOCKS if mark and mark.startswith("file ")}
 
 
-def to_run(language: str) -> list[str]:
-    return list(dict.fromkeys(text for mark, found, text in BLOCKS if found == language and mark is None))
+def to_run(language: str, mark: str | None = None) -> list[str]:
+    return list(dict.fromkeys(block.text for block in BLOCKS if (block.language, block.mark) == (language, mark)))
 
 
 def write_record(path: Path, output: str, seed: int, samples: int = 300) -> None:
@@ -88,6 +89,12 @@ def run(folder: Path, *command: str) -> str:
 
 @pytest.mark.parametrize("script", [text for text in to_run("sh") if "--save arm.simgap" not in text])  # below
 def test_the_commands_run(script, folder):
+    assert run(folder, "bash", "-euo", "pipefail", "-c", script)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", to_run("sh", "slow"))
+def test_the_long_commands_run(script, folder):
     assert run(folder, "bash", "-euo", "pipefail", "-c", script)
 
 

@@ -43,7 +43,7 @@ def run(rigs: list[str], seeds: int, engine: str, jobs: int, address: str | None
     console.print(f"The matrix: {file}; every case: {out / FILE}", highlight=False, markup=False)
     failed = [result for result in results if result.status != "ok"]
     if failed:
-        console.print(f"{len(failed)} cases failed, the first: {failed[0].message}", markup=False)
+        console.print(f"Cases that failed: {len(failed)}, the first: {failed[0].message}", markup=False)
         raise typer.Exit(1)
 
 
@@ -64,7 +64,7 @@ def make(
     from simgap.recovery import make_cases
 
     made = make_cases(seed, cases, out)
-    typer.echo(f"{len(made)} cases are in {out}; only the seed tells what is hidden in them")
+    typer.echo(f"Cases in {out}: {len(made)}. Only the seed tells what is hidden in them.")
 
 
 @app.command()

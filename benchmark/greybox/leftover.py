@@ -58,9 +58,8 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
         theta[: plant.order] = -plant.matrix(estimate.theta)[-1, ::-1]
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
-    responses = np.moveaxis(
-        simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))[..., 0], 0, 2
-    )  # [E, T, f]
+    runs = simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))
+    responses = np.stack([y[..., 0] for y in runs], axis=2)  # [E, T, f]
     jacobian = problem.jacobian(estimate.theta, estimate.local, plant.free)
     share = _predicted(estimate, records, responses, jacobian)
     mask = records.mask

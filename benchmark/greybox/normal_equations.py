@@ -78,7 +78,8 @@ class NormalEquations:
         h, weights, starts = self.reduced(damping)
         gradient = self.gradient - (self.cross @ starts[:, :, None]).sum(0)[:, 0]
         scale = scales_of(np.diag(self.h))
-        matrix = (h / scale / scale[:, None])[np.ix_(inside, inside)] + (damping + 1e-11) * np.eye(inside.sum())
+        matrix = (h / scale / scale[:, None])[inside][:, inside]
+        matrix.flat[:: len(matrix) + 1] += damping + 1e-11
         step = np.zeros(len(gradient))
         if inside.any():
             step[inside] = np.linalg.lstsq(matrix, (gradient / scale)[inside], rcond=1e-13)[0] / scale[inside]

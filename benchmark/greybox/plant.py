@@ -275,8 +275,8 @@ class Plant:
             return two_masses.matrix(sections)
         if self.cascade:
             return np.diag(-sections) + np.diag(sections[:-1], -1)
-        polynomial = np.ones(1)
-        for first in range(0, n, 2):
+        polynomial = np.array([1.0, *sections[:2]])
+        for first in range(2, n, 2):
             polynomial = np.convolve(polynomial, [1.0, *sections[first : first + 2]])
         a = np.diag(np.ones(n - 1), 1)
         a[-1] = -polynomial[:0:-1]

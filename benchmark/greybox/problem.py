@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from jaxtyping import Float
 
@@ -47,7 +49,7 @@ class Problem:
         self._sizes = plant.scales.output_sizes[: plant.ny] if plant.scales else records.sizes
         # What rounding adds to the square of each reading: a perfect fit has that, and none is better. [ny]
         self.least = (RESOLUTION * self._sizes / noise.deviations) ** 2
-        self._measured = records.mask[:, :, None]
+        self._measured = None if records.mask.all() else records.mask[:, :, None]
 
     def __reduce__(self) -> tuple[type[Problem], tuple[Plant, Records, Noise]]:
         """Be made anew in another process, where compiled loops have other addresses."""
@@ -63,7 +65,7 @@ class Problem:
 
     def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
         """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
-        errors = np.where(self._measured, self.records.y - self.simulator.run(theta, local), 0.0)
+        errors = self._where_measured(self.records.y - self.simulator.run(theta, local))
         if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR * self._sizes.min():  # nor when it is not a number
             largest = LARGEST_ERROR * self._sizes
             errors = np.clip(np.where(np.isnan(errors), largest, errors), -largest, largest)
@@ -120,6 +122,9 @@ class Problem:
         squares = [self.squares_of_each(self.errors(theta, start)) for start in starts]
         return starts[np.argmin(squares, axis=0), np.arange(len(local))]
 
+    def _where_measured(self, values: Float[np.ndarray, "E T ny"]) -> Float[np.ndarray, "E T ny"]:
+        return values if self._measured is None else np.where(self._measured, values, 0.0)
+
     def jacobian(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Jacobian:
         """Differentiate the simulation by forward differences, for the parameters `which` of theta."""
         plant, which = self.plant, np.flatnonzero(which)
@@ -139,12 +144,12 @@ class Problem:
         here, *there = self.simulator.run_many(thetas, locals_)
         m = here.shape[1] * here.shape[2]
         soft = self.records.soft
-        weights = softness(self.records.y - here, soft) if soft else 1.0
+        weights = softness(self.records.y - here, soft) if soft else None
 
         def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
             with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
-                change = np.where(self._measured, (moved - here) / step, 0.0) * weights
-                return self.noise.whiten(change).reshape(len(here), m)
+                change = self._where_measured((moved - here) / step)
+                return self.noise.whiten(change if weights is None else change * weights).reshape(len(here), m)
 
         of_theta = np.zeros((len(theta), len(here), m))
         for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):
@@ -191,14 +196,20 @@ class Problem:
 
     def _with_terms(self, sizes: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
         """Give the parameters of terms that are near zero a share of where they usually start."""
-        plant = self.plant
+        for at, usual in self._usual:
+            sizes[at] = np.maximum(sizes[at], usual)
+        return np.where(sizes > 0, sizes, SMALL)
+
+    @cached_property
+    def _usual(self) -> list[tuple[slice, Float[np.ndarray, " k"]]]:
+        """Where the parameters of each term stand in theta, and a share of where they usually start."""
+        plant, usual = self.plant, []
         for term in plant.terms:
             if term in plant.per_experiment:
                 continue
-            at = plant.part_of(term)
             starts = [abs(np.array(start.values)) for start in plant.starts_of(term)]
             if starts:
-                usual = 0.1 * np.median(starts, axis=0)
+                share = 0.1 * np.median(starts, axis=0)
                 reach = np.array([p.high - p.low for p in plant.parameters_of(term)])
-                sizes[at] = np.maximum(sizes[at], np.where(usual > 0, usual, SMALL * reach))
-        return np.where(sizes > 0, sizes, SMALL)
+                usual.append((plant.part_of(term), np.where(share > 0, share, SMALL * reach)))
+        return usual

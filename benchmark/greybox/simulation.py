@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 from jaxtyping import Float
-from numba import cfunc
+from numba import cfunc, types
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
 from simgap.greybox.kernels import (
@@ -27,10 +27,22 @@ from simgap.greybox.two_masses import ENTRY
 ROLES = get_args(Role)  # as the kernels number them
 
 
-@cache
-def compiled(term: Any) -> Any:
-    """Compile a force term for the inner loop."""
-    return cfunc(TERM, cache=True)(inspect.unwrap(term))
+class Law(types.WrapperAddressProtocol):
+    """A force term compiled for the inner loop; its address is known, and not worked out anew at every call."""
+
+    def __init__(self, term: Any) -> None:
+        self._compiled = cfunc(TERM, cache=True)(inspect.unwrap(term))
+        self._address = self._compiled.address
+
+    def __wrapper_address__(self) -> int:
+        return self._address
+
+    def signature(self) -> Any:
+        """Return the types of its arguments and of what it computes."""
+        return TERM
+
+
+compiled = cache(Law)
 
 
 def nothing(x, v, t, h, p, i, m, j):
@@ -64,6 +76,10 @@ class Simulator:
         self._n_commands, free = len(of_command), SLOTS - len(of_command)
         self._commands = tuple(compiled(effect.command) for effect in limited) + (compiled(nothing),) * free
         self._c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * free)
+        self._of_drive = np.zeros(plant.size, dtype=bool)  # the parameters that it depends on
+        on_inputs = [term for term in plant.terms if term.effect.port == "input"]
+        for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, on_inputs)):
+            self._of_drive[part] = True
         self._drives: dict[bytes, np.ndarray] = {}
         self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
         forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
@@ -91,18 +107,21 @@ class Simulator:
         n, s = plant.order, len(thetas)
         e, g0, g1 = np.empty((3, s, n, n))
         rates = np.empty((s, n))
-        for i, theta in enumerate(thetas):
-            # A parameter of an effect leaves the plant as it is.
-            if i and (theta[: plant.n_linear] == thetas[i - 1][: plant.n_linear]).all():
-                e[i], g0[i], g1[i], rates[i] = e[i - 1], g0[i - 1], g1[i - 1], rates[i - 1]
+        starts, begun = starts[:, :, :n], starts[:, :, n:]
+        drives = np.empty((s, *self._u.shape[1:]))
+        # Most steps of a Jacobian leave the poles as they are, or what drives the plant.
+        as_first = [(thetas[:, part] == thetas[0, part]).all(axis=1) for part in (plant.layout.poles, self._of_drive)]
+        as_first[1] &= (begun == begun[0]).all(axis=(1, 2))
+        for i, (same_poles, same_drive) in enumerate(zip(*as_first, strict=True)):
+            drives[i] = drives[0] if i and same_drive else self.drive(thetas[i], begun[i])
+            if i and same_poles:
+                e[i], g0[i], g1[i], rates[i] = e[0], g0[0], g1[0], rates[0]
                 continue
-            a = plant.matrix(theta)
+            a = plant.matrix(thetas[i])
             transition(a, self.h, e[i], g0[i], g1[i])
             rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
-        starts, begun = starts[:, :, :n], starts[:, :, n:]
         states = np.empty((s, experiments, samples, n))
         run, entry = (run_tanks_directly, 0) if plant.cascade else (run_body_directly, ENTRY if plant.joint else n - 1)
-        drives = np.stack([self.drive(*of_run) for of_run in zip(thetas, begun, strict=True)])
         run(
             e, g0, g1, rates, entry, drives, np.ascontiguousarray(starts), self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
@@ -211,8 +230,11 @@ class Simulator:
     ) -> Float[np.ndarray, "E T ny"]:
         """Read the sensors."""
         plant = self.plant
+        reading = plant.reading(theta)
+        (seen,) = np.nonzero(reading.any(axis=0))
         with np.errstate(over="ignore", invalid="ignore"):
-            y = states @ plant.reading(theta).T
+            one = reading.shape[0] == 1 and len(seen) == 1
+            y = states[:, :, seen] * reading[0, seen] if one else states @ reading.T
         for channel in range(plant.ny):
             for term in plant.on("output", channel):
                 if (power := term.effect.time_power) is not None:
@@ -229,7 +251,7 @@ class Simulator:
 
     def run_many(
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
-    ) -> Float[np.ndarray, "S E T ny"]:
+    ) -> list[Float[np.ndarray, "E T ny"]]:
         """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
         starts = locals_[:, :, : self.plant.n_start]
         keys = [t[self.plant.moves_states].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
@@ -240,4 +262,4 @@ class Simulator:
                 self._known |= zip(new, self.states(thetas[rows], starts[rows]), strict=True)
             y = [self.outputs(t, q, self._known[key]) for t, q, key in zip(thetas, locals_, keys, strict=True)]
         self._known = {keys[0]: self._known[keys[0]]}  # the Jacobian is asked for where a fit has just been
-        return np.stack(y)
+        return y

@@ -46,6 +46,7 @@ def test_where_nothing_is_hidden_nothing_is_named(colour):
     assert diagnose(hide("stage", {}, noise=0.1, colour=colour, seed=seed)).verdict == "nothing_found", seed
 
 
+@pytest.mark.slow
 def test_two_effects_at_once_are_both_named():
     diagnosis = diagnose(hide("cart", {"coulomb_friction": 1.0, "dead_zone": 1.0}, noise=0.05, seed=3))
     named = set().union(*answers(diagnosis))
@@ -107,6 +108,7 @@ def test_the_json_has_the_keys_of_schema_1(friction):
     assert answer["gain"]["low"] <= answer["gain"]["share"] <= answer["gain"]["high"]
 
 
+@pytest.mark.slow
 def test_the_gain_is_that_of_the_models_on_the_leaderboard(friction):
     dataset = hide("stage", {"coulomb_friction": 0.5}, noise=0.05, seed=8)
     for model, side in (("greybox", "before"), ("greybox-auto", "after")):
@@ -122,9 +124,9 @@ def test_the_profile_of_a_parameter_is_lowest_at_its_value(friction):
     assert profile.deviance[0] > 3.84 and profile.deviance[-1] > 3.84
 
 
-def test_the_same_seed_gives_the_same_answer(friction):
-    again = diagnose(hide("stage", {"coulomb_friction": 0.5}, noise=0.05, seed=8), profiles=True)
-    assert again.to_json() | {"seconds": 0} == friction.to_json() | {"seconds": 0}
+def test_the_same_seed_gives_the_same_answer():
+    first, again = (diagnose(hide("cart", {"coulomb_friction": 0.5}, noise=0.05, seed=8), seed=3) for _ in range(2))
+    assert again.to_json() | {"seconds": 0} == first.to_json() | {"seconds": 0}
 
 
 def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():

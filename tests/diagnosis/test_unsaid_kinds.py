@@ -66,6 +66,7 @@ def test_a_file_with_meaningless_headings_gets_the_answer_that_it_gets_where_the
     assert answer.to_json()["kinds"] == {"y": {"kind": "velocity", "from": "evidence"}}
 
 
+@pytest.mark.slow
 def test_a_kind_that_is_said_is_not_asked_of_the_records():
     data = hide("cart", {"coulomb_friction": 1.0}, 0.05, seed=7)
     answer = diagnose(without_card(data), views_too=False, kind="other")

@@ -46,7 +46,7 @@ def test_a_joint_turns_into_a_rigid_drive_where_its_spring_is_hard():
 def test_a_flexible_joint_is_no_lag_and_no_delay(rig, seed):
     joint, effects = identified(field.hide(rig, {}, noise=0.005, seed=seed))
     assert joint
-    assert effects == []
+    assert not {"actuator_lag", "sensor_lag", "input_delay"} & set(effects)
 
 
 @pytest.mark.slow

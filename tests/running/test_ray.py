@@ -55,6 +55,7 @@ def test_the_rows_are_those_of_one_machine_and_a_node_killed_in_the_middle_costs
         assert (row.status, row.message, row.metrics) == (alone.status, alone.message, alone.metrics)
 
 
+@pytest.mark.slow
 def test_a_model_gets_the_part_of_a_gpu_that_it_asks_for(suite, tmp_path):
     chosen = suite("SeesGpu", "Mean")
     Path(chosen).write_text(Path(chosen).read_text().replace(':SeesGpu"\n', ':SeesGpu"\ngpus = 0.5\n'))
