@@ -21,7 +21,7 @@ from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet, 
 from simgap.registry import EFFECTS
 
 KINDS = ("position", "velocity", "level", "other")
-LONGEST = 60.0  # s of this process, which others on the machine do not lengthen, for one set
+LONGEST = 180.0  # s of CPU: a search that does not end
 REFUSALS = (UnusableInput,)
 
 # ------------------------------------------------------------------ signals
