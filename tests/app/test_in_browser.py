@@ -138,7 +138,7 @@ def test_with_the_keyboard_alone_a_diagnosis_is_begun_and_stopped(tab, tmp_path)
     assert page.get_by_label("What v is").input_value() == "output"
     assert page.get_by_label("Kind of v").input_value() == "velocity"
     page.get_by_role("button", name="Diagnose").press("Enter")
-    page.get_by_role("button", name="Stop").press("Enter")
+    page.get_by_role("button", name="Stop", disabled=False).press("Enter")
     page.get_by_role("heading", name="No diagnosis of cart.csv").wait_for()
     assert "Stopped" in page.get_by_role("alert").inner_text()
 

@@ -24,8 +24,10 @@ async function ask() {
   setTimeout(ask, 400);
 }
 
-document.getElementById("stop").addEventListener("click", (event) => {
-  event.target.disabled = true;
+const stop = document.getElementById("stop");
+stop.addEventListener("click", () => {
+  stop.disabled = true;
   fetch("stop", { method: "POST" });
 });
+stop.disabled = false; // a press before this line would be lost
 ask();
