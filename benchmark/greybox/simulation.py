@@ -32,7 +32,8 @@ class Law(types.WrapperAddressProtocol):
 
     def __init__(self, term: Any) -> None:
         self._compiled = cfunc(TERM, cache=True)(inspect.unwrap(term))
-        self._address = self._compiled.address
+        assert self._compiled.address is not None, "a compiled function has an address"
+        self._address: int = self._compiled.address
 
     def __wrapper_address__(self) -> int:
         return self._address
