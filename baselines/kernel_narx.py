@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.kernel_regression import KernelNarx, Regression, scaled, stacked
-from simgap.baselines.estimation.narx_error import BOUND
+from simgap.baselines.estimation.narx_error import scales
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
 
@@ -55,9 +55,7 @@ class KernelNarxModel:
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)
-        u, y = (np.concatenate([getattr(x, signal) for x in data.train]) for signal in "uy")
-        means, sizes = (u.mean(axis=0), y.mean(axis=0)), (_size(u), _size(y))
-        bound = BOUND * float(np.abs((y - means[1]) / sizes[1]).max())
+        means, sizes, bound = scales(data.train)
         train = scaled(excerpt(data.train, EXCERPT), means, sizes)
         longest = max(len(x) for x in data.train)
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
@@ -123,11 +121,6 @@ def _search(
 def _regression(records: list[tuple[np.ndarray, np.ndarray]], structure: Structure, centres: int) -> Regression:
     r, y = stacked(records, structure.lags, structure.nk)
     return Regression.of(r, y, 0.5 / (structure.length**2 * r.shape[1]), centres, POOL)
-
-
-def _size(signals: np.ndarray) -> np.ndarray:
-    size = signals.std(axis=0)
-    return np.where(size > 0, size, 1.0)
 
 
 def _error(found: tuple[float, float, Structure]) -> float:

@@ -14,7 +14,7 @@ from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.forward_selection import forward_selection
 from simgap.baselines.estimation.monomials import monomials, regressors, values
-from simgap.baselines.estimation.narx_error import BOUND, NarxError, PolynomialNarx, refined, refined_safely
+from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -48,8 +48,7 @@ class Narx:
         records = excerpt(data.train, EXCERPT)
 
         def error(model: PolynomialNarx) -> float:
-            equation = NarxError.of(model, held_out, data.n_init)
-            return equation.squares(model.theta) / equation.samples if equation.records else np.inf
+            return NarxError.of(model, held_out, data.n_init).mean_square
 
         def safe_error(model: PolynomialNarx) -> float:
             return np.inf if NarxError.of(model, records, data.n_init).strays() else error(model)
@@ -80,13 +79,11 @@ class Narx:
 
     def _rankings(self, data: TrainingSet) -> Iterator[list[PolynomialNarx]]:
         """Yield the models of the first 1, 2, .. terms of every ranking, their coefficients by least squares."""
-        y = np.concatenate([x.y for x in data.train])
-        u = np.concatenate([x.u for x in data.train])
-        means, sizes = (u.mean(axis=0), y.mean(axis=0)), (_size(u), _size(y))
-        bound = BOUND * float(np.abs((y - means[1]) / sizes[1]).max())
+        means, sizes, bound = scales(data.train)
+        nu, ny = map(len, means)
         for lags in range(1, self.max_lags + 1):
             for nk in (1, 0):
-                n = y.shape[1] * lags + u.shape[1] * (lags + 1 - nk)
+                n = ny * lags + nu * (lags + 1 - nk)
                 for degree in range(1, self.max_degree + 1):
                     terms = monomials(n, degree)
                     if len(terms) <= CANDIDATES:
@@ -135,11 +132,6 @@ class Narx:
             yield replace(
                 all_terms, terms=all_terms.terms[np.concatenate(chosen)], owner=owner, theta=np.concatenate(theta)
             )
-
-
-def _size(signals: np.ndarray) -> np.ndarray:
-    size = signals.std(axis=0)
-    return np.where(size > 0, size, 1.0)
 
 
 def _first(pair: tuple[float, Any]) -> float:

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.monomials import maps, monomials, regressors, values
-from simgap.baselines.estimation.narx_error import BOUND, NarxError, PolynomialNarx, refined, refined_safely
+from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
 from simgap.baselines.estimation.thresholding import thresholded
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
@@ -53,8 +53,7 @@ class Sindy:
         records = excerpt(data.train, EXCERPT)
 
         def error(model: PolynomialNarx) -> float:
-            equation = NarxError.of(model, held_out, data.n_init)
-            return equation.squares(model.theta) / equation.samples if equation.records else np.inf
+            return NarxError.of(model, held_out, data.n_init).mean_square
 
         def strays(model: PolynomialNarx) -> bool:
             return NarxError.of(model, records, data.n_init).strays()
@@ -87,13 +86,12 @@ class Sindy:
 
     def _sparse(self, data: TrainingSet, records: Sequence[Experiment]) -> Iterator[PolynomialNarx]:
         """Yield a model for each order, delay, degree and threshold, as far as they differ."""
-        u, y = (np.concatenate([getattr(x, signal) for x in data.train]) for signal in "uy")
-        means, sizes = (u.mean(axis=0), y.mean(axis=0)), (_size(u), _size(y))
-        bound = BOUND * float(np.abs((y - means[1]) / sizes[1]).max())
+        means, sizes, bound = scales(data.train)
+        nu, ny = map(len, means)
         for order in range(1, self.max_order + 1):
             for nk in (1, 0):
                 for degree in range(1, self.max_degree + 1):
-                    terms = monomials(y.shape[1] * order + u.shape[1] * (order + 1 - nk), degree)
+                    terms = monomials(ny * order + nu * (order + 1 - nk), degree)
                     if len(terms) <= CANDIDATES:
                         empty = PolynomialNarx(
                             terms, terms[:, 0], np.zeros(len(terms)), order, nk, means, sizes, bound, True
@@ -127,8 +125,3 @@ def _thinned(model: PolynomialNarx, records: Sequence[Experiment]) -> Iterator[P
             owner, chosen = (index.copy() for index in np.nonzero(theta))
             real = theta[owner, chosen] * of_target[owner] / size[chosen]
             yield replace(model, terms=model.terms[chosen], owner=owner, theta=real)
-
-
-def _size(signals: np.ndarray) -> np.ndarray:
-    size = signals.std(axis=0)
-    return np.where(size > 0, size, 1.0)

@@ -17,6 +17,17 @@ STARTS, LONG = 100, 1000  # samples of the records from which a model must run f
 BOUND = 3.0  # a free run goes no further from the mean than so many times the largest training output
 
 
+def scales(
+    experiments: Sequence[Experiment],
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], float]:
+    """Measure means and sizes of u and y, and how far a free run may go from the mean, in sizes of y."""
+    u, y = (np.concatenate([getattr(x, signal) for x in experiments]) for signal in "uy")
+    means = u.mean(axis=0), y.mean(axis=0)
+    deviations = u.std(axis=0), y.std(axis=0)
+    sizes = np.where(deviations[0] > 0, deviations[0], 1.0), np.where(deviations[1] > 0, deviations[1], 1.0)
+    return means, sizes, BOUND * float(np.abs((y - means[1]) / sizes[1]).max())
+
+
 @dataclass(frozen=True, eq=False)
 class PolynomialNarx:
     """y_i(t) = sum of theta_k phi_k(t) over the k of output i; phi_k are products of past outputs and inputs.
@@ -83,6 +94,11 @@ class NarxError:
     def samples(self) -> int:
         """How many errors count."""
         return sum(y[self.model.lags :].size for _, y in self.records)
+
+    @property
+    def mean_square(self) -> float:
+        """Mean square of the model's own errors; infinite where no record is long enough."""
+        return self.squares(self.model.theta) / self.samples if self.records else np.inf
 
     def allowed(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
         """Give the point itself: a free run that leaves the bounds is dear enough."""
