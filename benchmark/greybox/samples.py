@@ -96,7 +96,12 @@ class Records:
 
 
 def sizes_of(signals: Float[np.ndarray, "N n"]) -> Float[np.ndarray, " n"]:
-    """Measure the spread of each signal, or a part of its largest value where that is more; 1 where all is zero."""
+    """Measure the spread of each signal, or a part of its largest value where that is more; 1 where all is zero.
+
+    No signal at all, where every reading of a short record is an outlier, has 1 too.
+    """
+    if not len(signals):
+        return np.ones(signals.shape[1])
     sizes = np.maximum(np.std(signals, axis=0), OFFSET * np.max(np.abs(signals), axis=0))
     return np.where(sizes > 0, sizes, 1.0)
 

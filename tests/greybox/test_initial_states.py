@@ -1,5 +1,7 @@
 """Where the simulations of a grey box begin: the states at the first sample, the model being known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -149,3 +151,10 @@ def test_where_records_start_anywhere_the_first_samples_decide():
 def test_few_records_have_no_usual_start():
     known, data, _ = axis(np.random.default_rng(5), np.zeros((4, 2)))
     assert usual_start(known, data, white_noise(0.1), 10) is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_where_every_reading_of_the_start_is_left_out_the_simulation_begins_at_the_first():
+    known, data, _ = made_of("velocity", samples=1)
+    unread = replace(data, mask=np.zeros_like(data.mask))
+    np.testing.assert_array_equal(initial_states(known, unread, white_noise(1.0)), data.y[:, 0])
