@@ -23,8 +23,10 @@ from simgap.registry import MODELS
 if TYPE_CHECKING:
     import control
 
-EXCERPT = 8192  # samples to compare orders on
+EXCERPT = 32768  # samples of the projections
+COARSE_EXCERPT = 8192  # samples to refine every order on
 COARSE, FINAL = 30, 60  # steps of the refinement
+EVERY = 8  # order; beyond, machines swing in many modes of two states each
 
 
 @MODELS.register("n4sid")
@@ -32,7 +34,7 @@ COARSE, FINAL = 30, 60  # steps of the refinement
 class N4sid:
     """x(t+1) = A x(t) + B u(t), y(t) = C x(t) + D u(t) + e(t), by subspace projections, then by simulation error.
 
-    Every order up to max_order is estimated with the weightings of N4SID, MOESP and CVA (Van Overschee and De Moor,
+    Every order up to 8, and every second one up to max_order, is estimated with the weightings of N4SID, MOESP and CVA (Van Overschee and De Moor,
     Automatica 30, 1994, and 31, 1995) from `horizon` past and future samples; the best of each order is refined by
     Levenberg-Marquardt over all elements of the matrices (McKelvey, Helmersson and Ribarits 2004), and the free run
     over held-out records chooses the order. With order given, nothing is chosen but the weighting.
@@ -41,14 +43,15 @@ class N4sid:
     parts: ClassVar = (StateSpace,)  # records in a saved model
 
     order: int | None = None
-    max_order: int = 8
-    horizon: int = 20
+    max_order: int = 24
+    horizon: int = 40
     model: StateSpace = field(init=False, repr=False)
 
     @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the order on train and valid, then estimate on both together; nothing here is random."""
-        orders = [self.order] if self.order else list(range(1, self.max_order + 1))
+        upper = range(EVERY + 2, self.max_order + 1, 2)
+        orders = [self.order] if self.order else [*range(1, min(self.max_order, EVERY) + 1), *upper]
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
         if not held_out:
             check_length(0, 1, data.n_init)
@@ -75,8 +78,9 @@ class N4sid:
             tried = error(model), model
             if model.order not in best or tried[0] < best[model.order][0]:
                 best[model.order] = tried
+        few = excerpt(data.train, COARSE_EXCERPT)
         for order, (before, model) in best.items():
-            after = refined(model, records, COARSE)
+            after = refined(model, few, COARSE)
             if (now := error(after)) < before:
                 best[order] = now, after
         models = [model for _, model in best.values()]

@@ -8,6 +8,8 @@ import numpy as np
 
 from simgap.records import Experiment
 
+SHORTEST = 1024  # samples of an experiment in an excerpt
+
 
 def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Stack experiments to (u [B, T, nu], y [B, T, ny]) for each length T that occurs, in the order given."""
@@ -18,10 +20,13 @@ def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarra
 
 
 def excerpt(experiments: Sequence[Experiment], samples: int) -> list[Experiment]:
-    """Take experiments until there are enough samples, of the last one its end: records often begin at rest."""
-    taken: list[Experiment] = []
-    for experiment in experiments:
-        if samples > 0:
-            taken.append(experiment[max(len(experiment) - samples, 0) :])
-            samples -= len(experiment)
-    return taken
+    """Take so many samples of experiments, spread evenly over them, of each its end: records often begin at rest.
+
+    The amplitude, or whatever else the experiments differ by, may grow from the first to the last.
+    """
+    if sum(map(len, experiments)) <= samples:
+        return list(experiments)
+    count = min(max(samples // SHORTEST, 1), len(experiments))
+    share = samples // count
+    places = np.linspace(0, len(experiments) - 1, count).round().astype(int)
+    return [experiments[i][max(len(experiments[i]) - share, 0) :] for i in places]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from simgap.baselines.estimation.state_space_kernels import run
 
@@ -79,3 +79,22 @@ class StateSpace:
         import control
 
         return control.StateSpace(self.a, self.b, self.c, self.d, self.dt)
+
+
+def blocks(order: int) -> Bool[np.ndarray, "n n"]:
+    """Tell where the 2 x 2 blocks on the diagonal of A are, the last one of an odd order being a single element."""
+    block = np.arange(order) // 2
+    return block[:, None] == block
+
+
+def in_blocks(
+    a: Float[np.ndarray, "n n"], c: Float[np.ndarray, "ny n"]
+) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, "ny n"]]:
+    """Change the coordinates of the states so that A is 0 outside of `blocks`; each block has two of its poles."""
+    values, vectors = np.linalg.eig(a)
+    real = vectors[:, values.imag == 0].real[:, np.argsort(values[values.imag == 0].real)]
+    pairs = [np.stack((v.real, v.imag), axis=1) for v in vectors[:, values.imag > 0].T]
+    pairs += [real[:, k : k + 2] for k in range(0, real.shape[1], 2)]
+    basis = np.concatenate([np.linalg.qr(pair)[0] for pair in pairs], axis=1)
+    moved = np.linalg.lstsq(basis, a @ basis, rcond=None)[0]  # poles that coincide share a direction
+    return np.where(blocks(len(a)), moved, 0.0), c @ basis

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.levenberg import Cost, sum_up
-from simgap.baselines.estimation.state_space import StateSpace
+from simgap.baselines.estimation.state_space import StateSpace, blocks
 from simgap.baselines.estimation.state_space_kernels import pushed
 from simgap.baselines.estimation.subspace import stable_matrix
 from simgap.records import Experiment
@@ -19,8 +19,9 @@ from simgap.records import Experiment
 class StateSpaceError:
     """e = (y_hat - y) / size after the first n_init samples of each experiment, as a function of A, B, C, D, y_mean.
 
-    theta holds all their elements; those that a change of the states' coordinates cancels are left to the damping of
-    the search, which takes the shortest step (McKelvey, Helmersson and Ribarits, Automatica 40, 2004).
+    theta holds the elements of A's blocks and all of the others. What a change of the states' coordinates cancels is
+    left to the damping of the search, which takes the shortest step (McKelvey, Helmersson and Ribarits, Automatica 40,
+    2004, for a full A; blocks cost n^2 instead of n^3 in each sample).
     """
 
     model: StateSpace
@@ -41,12 +42,17 @@ class StateSpaceError:
     def theta(self) -> Float[np.ndarray, " p"]:
         """Where the search starts."""
         model = self.model
-        return np.concatenate([part.ravel() for part in (model.a, model.b, model.c, model.d, model.y_mean)])
+        a = model.a[blocks(model.order)]
+        return np.concatenate([a, *(part.ravel() for part in (model.b, model.c, model.d, model.y_mean))])
 
     def at(self, theta: Float[np.ndarray, " p"]) -> StateSpace:
         """Give the model of theta."""
-        changed, place = {}, 0
-        for name in ("a", "b", "c", "d", "y_mean"):
+        free = blocks(self.model.order)
+        place = int(free.sum())
+        a = np.zeros(free.shape)
+        a[free] = theta[:place]
+        changed = {"a": a}
+        for name in ("b", "c", "d", "y_mean"):
             old = getattr(self.model, name)
             changed[name] = np.ascontiguousarray(theta[place : place + old.size].reshape(old.shape))
             place += old.size
@@ -54,10 +60,10 @@ class StateSpaceError:
 
     def allowed(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
         """Give the point with the poles inside the unit circle or on it."""
-        repaired = theta.copy()
-        a = self.at(theta).a
-        repaired[: a.size] = stable_matrix(a, 1.0).ravel()
-        return [repaired]
+        a, free = self.at(theta).a, blocks(self.model.order)
+        for k in range(0, len(a), 2):
+            a[k : k + 2, k : k + 2] = stable_matrix(a[k : k + 2, k : k + 2], 1.0)
+        return [np.concatenate((a[free], theta[int(free.sum()) :]))]
 
     def squares(self, theta: Float[np.ndarray, " p"]) -> float:
         """Compute |e|^2."""
@@ -82,17 +88,13 @@ class StateSpaceError:
         length = max((len(y) for _, y in self.records), default=0)
         free = model.free_response(length)[0].reshape(length, ny, model.order)
         for e, x, u in self._runs(model, gain):
-            signals = np.concatenate((x, u), axis=1)
-            responses = pushed(model.a, model.c, signals)  # [N, N + nu, T, ny]
-            order, count = model.order, signals.shape[1]
-            direct = np.zeros((ny, count, *responses.shape[2:]))
-            for o in range(ny):
-                direct[o, :, :, o] = signals.T
-            parts = (
-                responses[:, :order], responses[:, order:], direct[:, :order], direct[:, order:],
-                np.broadcast_to(np.eye(ny)[:, None], (ny, len(u), ny)),
-            )  # fmt: skip
-            slopes = np.concatenate([part.reshape(-1, len(u), ny) for part in parts])
+            responses = pushed(model.a, model.c, x, np.ascontiguousarray(u))  # [N, 2 + nu, T, ny]
+            of_a = responses[:, :2].reshape(-1, len(u), ny)[: int(blocks(model.order).sum())]
+            of_c, of_d = (np.einsum("ti,op->oitp", signals, np.eye(ny)) for signals in (x, u))
+            of_mean = np.broadcast_to(np.eye(ny)[:, None], (ny, len(u), ny))
+            slopes = np.concatenate(
+                [part.reshape(-1, len(u), ny) for part in (of_a, responses[:, 2:], of_c, of_d, of_mean)]
+            )
             moved = slopes[:, :n].reshape(len(slopes), -1) @ gain.T  # [p, N]
             slopes -= np.tensordot(moved, free[: len(u)], axes=(1, 2))
             yield e, (slopes / self.size)[:, n:]

@@ -31,28 +31,31 @@ def run(a, b, c, d, u, x0):
     return y, x
 
 
-@njit("float64[:,:,:,::1](float64[:,::1], float64[:,::1], float64[:,::1])", cache=True)
-def pushed(a, c, signals):
-    """Give [n, m, T, ny]: the output when signal j of [T, m] is added to state i of x(t+1) = A x(t), from rest."""
-    length, m, n, ny = signals.shape[0], signals.shape[1], len(a), len(c)
-    out = np.zeros((n, m, length, ny))
-    moved, after = np.zeros((n, n)), np.zeros((n, n))  # [state, pushed state]
-    for j in range(m):
-        moved[:] = 0.0
-        for t in range(length):
-            for o in range(ny):
-                for i in range(n):
-                    total = 0.0
-                    for k in range(n):
-                        total += c[o, k] * moved[k, i]
-                    out[i, j, t, o] = total
-            for i in range(n):
-                for k in range(n):
-                    after[i, k] = 0.0
-                for h in range(n):
-                    weight = a[i, h]
-                    for k in range(n):
-                        after[i, k] += weight * moved[h, k]
-                after[i, i] += signals[t, j]
-            moved[:] = after
+@njit("float64[:,:,:,::1](float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])", cache=True)
+def pushed(a, c, x, u):
+    """Give [n, m, T, ny]: the output when a signal is added to state i of x(t+1) = A x(t), from rest; A in blocks.
+
+    The signals are the two states [T, n] of the block of i, where x has columns, and then the inputs [T, nu].
+    """
+    length, n, nu, ny = u.shape[0], len(a), u.shape[1], len(c)
+    own = 2 if x.shape[1] else 0
+    out = np.zeros((n, own + nu, length, ny))
+    for i in range(n):
+        first = i - i % 2
+        last = min(first + 1, n - 1)
+        for j in range(own + nu):
+            if j < own and first + j > last:
+                continue
+            one, two = 0.0, 0.0
+            for t in range(length):
+                for o in range(ny):
+                    out[i, j, t, o] = c[o, first] * one + (c[o, last] * two if last > first else 0.0)
+                signal = x[t, first + j] if j < own else u[t, j - own]
+                after = a[first, first] * one + (a[first, last] * two if last > first else 0.0)
+                two = a[last, first] * one + a[last, last] * two
+                one = after
+                if i == first:
+                    one += signal
+                else:
+                    two += signal
     return out

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
-from simgap.baselines.estimation.state_space import StateSpace
+from simgap.baselines.estimation.state_space import StateSpace, in_blocks
 from simgap.baselines.estimation.state_space_kernels import pushed
 from simgap.records import Experiment
 
@@ -32,11 +32,11 @@ def state_spaces(experiments: Sequence[Experiment], orders: Sequence[int], horiz
         for order in orders:
             if order <= len(values) - ny and values[order - 1] > 1e-10 * values[0]:
                 gamma = directions[:, :order] * np.sqrt(values[:order])
-                a = _stable(np.linalg.lstsq(gamma[:-ny], gamma[ny:], rcond=None)[0])
-                b, d, offset = _inputs(scaled, a, gamma[:ny])
+                a, c = in_blocks(_stable(np.linalg.lstsq(gamma[:-ny], gamma[ny:], rcond=None)[0]), gamma[:ny])
+                b, d, offset = _inputs(scaled, a, c)
                 yield with_spread(
                     StateSpace(
-                        a, b / sizes[0], gamma[:ny] * sizes[1][:, None], d / sizes[0] * sizes[1][:, None],
+                        a, b / sizes[0], c * sizes[1][:, None], d / sizes[0] * sizes[1][:, None],
                         means[0], means[1] + offset * sizes[1], sizes[1] ** 2, np.eye(order), experiments[0].dt,
                     ), experiments, 1,
                 )  # fmt: skip
@@ -116,13 +116,13 @@ def _inputs(
     for u, y in scaled:
         length = len(u)
         columns = np.zeros((count + 1, length, ny))
-        columns[: n * nu] = pushed(a, c, np.ascontiguousarray(u)).reshape(n * nu, length, ny)
+        columns[: n * nu] = pushed(a, c, np.zeros((length, 0)), np.ascontiguousarray(u)).reshape(n * nu, length, ny)
         for o in range(ny):
             columns[n * nu + o * nu : n * nu + (o + 1) * nu, :, o] = u.T
             columns[n * nu + ny * nu + o, :, o] = 1.0
         columns[-1] = y
         impulse = np.eye(length + 1, 1)
-        free = pushed(a, c, impulse)[:, 0, 1:].reshape(n, -1)
+        free = pushed(a, c, np.zeros((length + 1, 0)), impulse)[:, 0, 1:].reshape(n, -1)
         basis = np.linalg.qr(free.T)[0]
         flat = columns.reshape(count + 1, -1)
         flat = flat - (flat @ basis) @ basis.T
