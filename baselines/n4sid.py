@@ -14,11 +14,11 @@ from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.levenberg import minimise
 from simgap.baselines.estimation.linear import simplest
-from simgap.baselines.estimation.state_space import StateSpace
 from simgap.baselines.estimation.state_space_error import StateSpaceError
-from simgap.baselines.estimation.subspace import state_spaces, with_spread
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
+from simgap.subspace.projections import state_spaces, with_spread
+from simgap.subspace.state_space import StateSpace
 
 if TYPE_CHECKING:
     import control
@@ -34,10 +34,11 @@ EVERY = 8  # order; beyond, machines swing in many modes of two states each
 class N4sid:
     """x(t+1) = A x(t) + B u(t), y(t) = C x(t) + D u(t) + e(t), by subspace projections, then by simulation error.
 
-    Every order up to 8, and every second one up to max_order, is estimated with the weightings of N4SID, MOESP and CVA (Van Overschee and De Moor,
-    Automatica 30, 1994, and 31, 1995) from `horizon` past and future samples; the best of each order is refined by
-    Levenberg-Marquardt over all elements of the matrices (McKelvey, Helmersson and Ribarits 2004), and the free run
-    over held-out records chooses the order. With order given, nothing is chosen but the weighting.
+    Every order up to 8, and every second one up to max_order, is estimated with the weightings of N4SID, MOESP and CVA
+    (Van Overschee and De Moor, Automatica 30, 1994, and 31, 1995) from `horizon` past and future samples; the best of
+    each order is refined by Levenberg-Marquardt over the elements of the matrices, A being block diagonal (after
+    McKelvey, Helmersson and Ribarits 2004), and the free run over held-out records chooses the order. With order given,
+    nothing is chosen but the weighting.
     """
 
     parts: ClassVar = (StateSpace,)  # records in a saved model

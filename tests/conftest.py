@@ -15,7 +15,7 @@ INSIDE_A_FIT = (
     "baselines.estimation.box_jenkins_error", "baselines.estimation.filters", "baselines.estimation.gram",
     "baselines.estimation.levenberg", "baselines.estimation.monomials", "baselines.estimation.narx_error",
     "baselines.estimation.output_error", "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
-    "baselines.estimation.state_space", "baselines.estimation.state_space_error", "baselines.estimation.thresholding",
+    "baselines.estimation.state_space_error", "baselines.estimation.thresholding", "subspace.state_space",
 )  # fmt: skip
 # Compares the sizes of all attributes of a saved model; with each of its calls checked, each would stand alone.
 CHECKS_ITSELF = "saved.codec"

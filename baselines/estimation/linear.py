@@ -17,9 +17,9 @@ from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
-from simgap.baselines.estimation.state_space import StateSpace
 from simgap.records import Channels, Experiment, TrainingSet, UnusableInput
 from simgap.step_form import StepForm
+from simgap.subspace.state_space import StateSpace
 
 if TYPE_CHECKING:
     import control

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.levenberg import Cost, sum_up
-from simgap.baselines.estimation.state_space import StateSpace, blocks
-from simgap.baselines.estimation.state_space_kernels import pushed
-from simgap.baselines.estimation.subspace import stable_matrix
 from simgap.records import Experiment
+from simgap.subspace.kernels import pushed
+from simgap.subspace.projections import stable_matrix
+from simgap.subspace.state_space import StateSpace, blocks
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,14 +16,16 @@ from simgap.greybox.held_out import block_errors, errors_on, in_most
 from simgap.greybox.noise import Noise, log_likelihood, schwarz_order, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
-from simgap.greybox.pole_search import fit_plain
+from simgap.greybox.pole_search import fit_from, fit_plain
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.score_test import candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.subspace_start import linear_models, starts
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import score_gain
 from simgap.records import Channels, Experiment, Kind
+from simgap.subspace.state_space import StateSpace
 
 MAX_ORDER = 8
 USUAL = 4  # beyond, an order must be likelier in training too, because so many poles fit any few held-out blocks
@@ -121,28 +123,26 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
         return [
             fit_plain(Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2), train)
         ]
+    single = kind != "level" and nu == 1
+    models = linear_models(train, range(3, MAX_ORDER + 1)) if single else []
     tried: list[tuple[Estimate, np.ndarray]] = []
     smaller: dict[bool, Estimate] = {}  # of one order less, without and with zeros
     rounds_in_vain = 0
     for order in range(kind == "level", MAX_ORDER + 1):
-        of_order: dict[bool, Estimate] = {}
-        for zeros in {0: (0, 1), 1: (0,)}.get(order, (0,) if kind == "level" else (0, order - 1)):
-            plant = Plant(kind, order, nu, dt, zeros=zeros, offset=True)
-            before = of_order.get(False) if zeros else smaller.get(False) if order > 2 else None
-            fits = [fit_plain(plant, train, before)]
-            if zeros and order > 2:  # a slow pole beside its zero is found in no model without zeros
-                fits += _of_the_input(fit_plain(plant, train, smaller[True]), train)
-            of_order[zeros > 0] = min(fits, key=lambda fit: float(np.sum(fit.errors**2)))
-        here = [(fit, block_errors(fit, valid, n_init)) for fit in of_order.values()]
-        if order > USUAL and not _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train):
+        of_order = _of_order(order, kind, train, smaller, models)
+        if not of_order:
             break
+        here = [(fit, block_errors(fit, valid, n_init)) for fit in of_order.values()]
+        likely = order <= USUAL or _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train)
         known = min((squares.mean() for _, squares in tried), default=np.inf)
-        tried += here
         smaller = of_order
         # A resonance takes two orders.
-        rounds_in_vain = (
-            rounds_in_vain + 1 if min(squares.mean() for _, squares in here) > (1 - WORTH_AN_ORDER) * known else 0
-        )
+        if likely and min(squares.mean() for _, squares in here) <= (1 - WORTH_AN_ORDER) * known:
+            rounds_in_vain = 0
+        else:
+            rounds_in_vain += 1
+        if likely:
+            tried += here
         if rounds_in_vain == 2:
             break
     best = min((squares for _, squares in tried), key=np.mean)
@@ -155,10 +155,34 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
     return chosen
 
 
-def _of_the_input(fit: Estimate, train: Records) -> list[Estimate]:
-    """Keep a model whose poles all act within a record; a slower one beside its zero is an offset of each record."""
+def _of_order(
+    order: int, kind: Kind, train: Records, smaller: dict[bool, Estimate], models: Sequence[StateSpace]
+) -> dict[bool, Estimate]:
+    """Fit the plain linear models of one order: without zeros, and with as many as it may have.
+
+    A high order begins at projections alone, where there are any, and has zeros; it may have no model that acts.
+    """
+    fits: dict[bool, Estimate] = {}
+    for zeros in {0: (0, 1), 1: (0,)}.get(order, (0,) if kind == "level" else (0, order - 1)):
+        plant = Plant(kind, order, train.u.shape[2], train.dt, zeros=zeros, offset=True)
+        found: list[Estimate] = []
+        if order <= USUAL or not models:
+            before = fits.get(False) if zeros else smaller.get(False) if order > 2 else None
+            found.append(fit_plain(plant, train, before))
+        if zeros and order > 2:  # a slow pole beside its zero is found in no model without zeros
+            further = [fit_plain(plant, train, smaller[True])]
+            if begun := starts(plant, models):
+                further.append(fit_from(plant, train, begun))
+            found += [fit for fit in further if _is_of_the_input(fit, train)]
+        if found:
+            fits[zeros > 0] = min(found, key=lambda fit: float(np.sum(fit.errors**2)))
+    return fits
+
+
+def _is_of_the_input(fit: Estimate, train: Records) -> bool:
+    """Tell whether all poles act within a record; a slower one beside its zero is an offset of each record."""
     poles = np.linalg.eigvals(fit.plant.matrix(fit.theta))
-    return [fit] if np.min(np.abs(poles)) * train.duration > 1 else []
+    return bool(np.min(np.abs(poles)) * train.duration > 1)
 
 
 def _likelier(larger: Sequence[Estimate], smaller: Sequence[Estimate], train: Records) -> bool:

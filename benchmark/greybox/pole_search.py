@@ -32,7 +32,7 @@ def fit_plain(
 
     With a delay it is linear too; `of_terms` holds the parameters of the terms to begin with.
     """
-    problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
+    problem = _plain_problem(plant, records)
     begun = []
     # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it. Zeros that are known of
     # a smaller model move along.
@@ -54,11 +54,29 @@ def fit_plain(
         begun.append(theta)
     steps = STEPS_WITH_ZEROS if with_zeros is not None else 2
     tried = on_cores(partial(descend, problem, fixed=~linear, max_steps=steps), begun)
+    return _finished(problem, tried, FEW_STEPS if len(of_terms) else MAX_STEPS)
+
+
+def fit_from(plant: Plant, records: Records, starts: Sequence[np.ndarray]) -> Estimate:
+    """Fit a plain linear model from the best of given starts, whose gains and zeros are fitted first."""
+    problem = _plain_problem(plant, records)
+    fixed = np.zeros(plant.size, dtype=bool)
+    fixed[plant.layout.poles] = True
+    tried = on_cores(partial(descend, problem, fixed=fixed, max_steps=STEPS_WITH_ZEROS), starts)
+    return _finished(problem, tried, MAX_STEPS)
+
+
+def _plain_problem(plant: Plant, records: Records) -> Problem:
+    spread = np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)
+    return Problem(plant, records, white(spread))
+
+
+def _finished(problem: Problem, tried: list[Estimate], max_steps: int) -> Estimate:
+    """Fit the best of these on; then again, the outputs weighed by how well they can be simulated."""
+    plant, records = problem.plant, problem.records
     tried.sort(key=lambda fit: fit.squares)
-    few = FEW_STEPS if len(of_terms) else MAX_STEPS
-    fits = on_cores(partial(_go_on, problem, max_steps=few), tried[:FINALISTS])
+    fits = on_cores(partial(_go_on, problem, max_steps=max_steps), tried[:FINALISTS])
     best = min(fits, key=lambda fit: fit.squares)
-    # The outputs are weighed by how well they can be simulated.
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
     return descend(Problem(plant, records, noise), best.theta, best.local)
 

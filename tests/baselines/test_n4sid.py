@@ -8,9 +8,9 @@ from scipy.signal import lfilter
 
 from simgap.baselines.estimation.levenberg import minimise
 from simgap.baselines.estimation.state_space_error import StateSpaceError
-from simgap.baselines.estimation.subspace import WEIGHTINGS, state_spaces
 from simgap.baselines.n4sid import N4sid
 from simgap.records import Experiment, TrainingSet
+from simgap.subspace.projections import WEIGHTINGS, state_spaces
 
 POLES = np.array([0.5 - 0.3j, 0.5 + 0.3j, 0.7, 0.9])
 

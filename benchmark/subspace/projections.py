@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
-from simgap.baselines.estimation.state_space import StateSpace, in_blocks
-from simgap.baselines.estimation.state_space_kernels import pushed
 from simgap.records import Experiment
+from simgap.subspace.kernels import pushed
+from simgap.subspace.state_space import StateSpace, in_blocks
 
 WEIGHTINGS = ("n4sid", "moesp", "cva")
 CHUNK = 4096
@@ -21,6 +21,8 @@ def state_spaces(experiments: Sequence[Experiment], orders: Sequence[int], horiz
     """Yield a model of each order by each weighting: A and C from the shift of Gamma, then B and D by least squares.
 
     Van Overschee and De Moor 1994 (N4SID) and 1995 (the weightings MOESP and CVA as cases of one theorem).
+
+    Past and future of `horizon` samples each are compared; an order that they cannot show has no model.
     """
     u, y = (np.concatenate([getattr(e, signal) for e in experiments]) for signal in "uy")
     means, sizes = (u.mean(axis=0), y.mean(axis=0)), (_size(u), _size(y))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
-from simgap.baselines.estimation.state_space_kernels import run
+from simgap.subspace.kernels import run
 
 if TYPE_CHECKING:
     import control

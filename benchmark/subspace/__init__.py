@@ -1,0 +1,1 @@
+"""Linear state-space models from projections of measured signals."""
