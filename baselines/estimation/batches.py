@@ -8,7 +8,7 @@ import numpy as np
 
 from simgap.records import Experiment
 
-SHORTEST = 1024  # samples of an experiment in an excerpt
+SHORTEST = 1024  # samples of a long experiment in an excerpt
 
 
 def stack(experiments: Sequence[Experiment]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -26,7 +26,8 @@ def excerpt(experiments: Sequence[Experiment], samples: int) -> list[Experiment]
     """
     if sum(map(len, experiments)) <= samples:
         return list(experiments)
-    count = min(max(samples // SHORTEST, 1), len(experiments))
+    usual = sum(map(len, experiments)) // len(experiments)
+    count = min(max(samples // min(usual, SHORTEST), 1), len(experiments))
     share = samples // count
     places = np.linspace(0, len(experiments) - 1, count).round().astype(int)
     return [experiments[i][max(len(experiments[i]) - share, 0) :] for i in places]

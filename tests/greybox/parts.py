@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simgap.greybox import initial_states as starts
-from simgap.greybox import noise, outliers, signal_scales
+from simgap.greybox import noise, outliers, signal_scales, subspace_start
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
@@ -159,6 +159,12 @@ def own_numbers_of_each(made, data, weighing):
 def initial_states(made, data, weighing):
     """The states [E, q] at the first sample of each record."""
     return starts.initial_states(problem_of(made, data, weighing), made.theta)
+
+
+def started_from_projections(data, order):
+    """Plants of an order with all zeros, and where their fits begin."""
+    plant = Plant("other", order, 1, data.dt, zeros=order - 1, offset=True)
+    return [Model(plant, theta) for theta in subspace_start.starts(plant, subspace_start.linear_models(data, [order]))]
 
 
 def problem_of(made, data, weighing):
