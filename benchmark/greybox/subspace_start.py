@@ -40,7 +40,8 @@ def starts(plant: Plant, models: Sequence[StateSpace]) -> list[Float[np.ndarray,
     if plant.nu != 1 or plant.cascade or plant.zeros != plant.order - 1:
         return []
     with np.errstate(all="ignore"):
-        begun = [_theta_of(plant, model) for model in models if model.order == plant.order]
+        known = (model for model in models if model.order == plant.order and np.isfinite(model.a).all())
+        begun = [_theta_of(plant, model) for model in known if np.isfinite(model.b).all()]
     return [theta for theta in begun if np.isfinite(theta).all()]
 
 
@@ -65,13 +66,14 @@ def _theta_of(plant: Plant, model: StateSpace) -> Float[np.ndarray, " p"]:
     What acts at once, D, is left out.
     """
     values, vectors = np.linalg.eig(model.a)
-    values = np.where((values.imag == 0) & (values.real < OVER), OVER, values)
-    poles = np.log(values.astype(complex)) / plant.dt
-    residues = (model.c @ vectors)[0] * np.linalg.solve(vectors, model.b.astype(complex))[:, 0] * poles / (values - 1)
-    numerator = sum(r * np.poly(np.delete(poles, i)) for i, r in enumerate(residues))
+    values = np.where((np.imag(values) == 0) & (np.real(values) < OVER), OVER, values) + 0j
+    poles = np.log(values) / plant.dt
+    residues = (model.c @ vectors)[0] * np.linalg.lstsq(vectors, model.b + 0j)[0][:, 0] * poles / (values - 1)
+    numerator = np.sum([r * np.poly(np.delete(poles, i)) for i, r in enumerate(residues)], axis=0)
     ascending = np.real(numerator)[::-1]
-    real = np.sort(poles[poles.imag == 0].real)
-    sections = [[-2 * p.real, abs(p) ** 2] for p in poles[poles.imag > 0]]
+    turn = np.imag(poles)
+    real = np.sort(np.real(poles[turn == 0]))
+    sections = [[-2 * np.real(p), abs(p) ** 2] for p in poles[turn > 0]]
     sections += [[-a - b, a * b] for a, b in zip(real[:-1:2], real[1::2], strict=False)]
     theta = np.zeros(plant.size)
     theta[plant.layout.poles] = [*np.ravel(sections), *(-real[len(real) - len(real) % 2 :])]

@@ -92,8 +92,9 @@ def in_blocks(
 ) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, "ny n"]]:
     """Change the coordinates of the states so that A is 0 outside of `blocks`; each block has two of its poles."""
     values, vectors = np.linalg.eig(a)
-    real = vectors[:, values.imag == 0].real[:, np.argsort(values[values.imag == 0].real)]
-    pairs = [np.stack((v.real, v.imag), axis=1) for v in vectors[:, values.imag > 0].T]
+    rate, turn = np.real(values), np.imag(values)
+    real = np.real(vectors[:, turn == 0])[:, np.argsort(rate[turn == 0])]
+    pairs = [np.stack((np.real(v), np.imag(v)), axis=1) for v in vectors[:, turn > 0].T]
     pairs += [real[:, k : k + 2] for k in range(0, real.shape[1], 2)]
     basis = np.concatenate([np.linalg.qr(pair)[0] for pair in pairs], axis=1)
     moved = np.linalg.lstsq(basis, a @ basis, rcond=None)[0]  # poles that coincide share a direction
