@@ -169,11 +169,12 @@ def _of_order(
         if order <= USUAL or not models:
             before = fits.get(False) if zeros else smaller.get(False) if order > 2 else None
             found.append(fit_plain(plant, train, before))
-        if zeros and order > 2:  # a slow pole beside its zero is found in no model without zeros
-            further = [fit_plain(plant, train, smaller[True])]
-            if begun := starts(plant, models):
-                further.append(fit_from(plant, train, begun))
-            found += [fit for fit in further if _is_of_the_input(fit, train)]
+        begun = starts(plant, models)
+        further = [fit_from(plant, train, begun)] if begun else []
+        if zeros and order > 2 and not (begun and order > USUAL):
+            # A slow pole beside its zero is found in no model without zeros.
+            further.append(fit_plain(plant, train, smaller[True]))
+        found += [fit for fit in further if _is_of_the_input(fit, train)]
         if found:
             fits[zeros > 0] = min(found, key=lambda fit: float(np.sum(fit.errors**2)))
     return fits
