@@ -103,6 +103,7 @@ def test_the_python_runs(script, folder):
     assert "# Leaderboard" in run(folder, sys.executable, "-W", "error", "-c", script)
 
 
+@pytest.mark.slow
 def test_the_way_from_a_log_to_a_better_simulator_ends_with_the_numbers_that_it_shows(folder):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     (script,) = (text for text in to_run("sh") if "--save arm.simgap" in text)

@@ -53,13 +53,17 @@ def gaps_of(subject: Subject, joint: Joint) -> tuple[list[Gap], Joint]:
     return found, joint
 
 
-def add_gap(root: ET.Element, gap: Gap, step: float) -> dict[str, str]:
-    """Add stem, follower and tendons to a model; return what drives the stem, as attributes of an actuator."""
+def add_gap(root: ET.Element, gap: Gap, step: float, joint: str, prefix: str = "") -> dict[str, str]:
+    """Add stem, follower and tendons to a model; return what drives the stem, as attributes of an actuator.
+
+    `joint` is the name of the machine's joint; `prefix` stands before the names of what is added.
+    """
     hold = HOLDS * gap.stiffness * gap.largest
     mass = hold / (FOLLOWS**2 * GIVES * gap.width) * step**2
     spring, damping = mass * (FOLLOWS / step) ** 2, 2 * mass * FOLLOWS / step
-    world, soft, names = root.find("worldbody"), f"{2 * step!r} 1", (f"stem{gap.channel}", f"follower{gap.channel}")
+    world, soft = root.find("worldbody"), f"{2 * step!r} 1"
     assert world is not None
+    names = [f"{prefix}{part}{gap.channel}" for part in ("stem", "follower", "hold", "pull")]
     stem = _slider(world, names[0], mass)
     _slider(
         stem, names[1], HEAVY * gap.stiffness * step**2, limited="true", solimplimit=STIFF, solreflimit=soft,
@@ -68,18 +72,19 @@ def add_gap(root: ET.Element, gap: Gap, step: float) -> dict[str, str]:
     tendons = root.find("tendon")
     tendons = ET.SubElement(root, "tendon") if tendons is None else tendons
     rub = ET.SubElement(
-        tendons, "fixed", name=f"hold{gap.channel}", frictionloss=repr(hold), solimpfriction=STIFF, solreffriction=soft
+        tendons, "fixed", name=names[2], frictionloss=repr(hold), solimpfriction=STIFF, solreffriction=soft
     )
-    pull = ET.SubElement(tendons, "fixed", name=f"pull{gap.channel}", stiffness=repr(gap.stiffness), springlength="0")
+    pull = ET.SubElement(tendons, "fixed", name=names[3], stiffness=repr(gap.stiffness), springlength="0")
     for tendon in (rub, pull):
-        for name in names:
+        for name in names[:2]:
             ET.SubElement(tendon, "joint", joint=name, coef="1")
-    ET.SubElement(pull, "joint", joint="joint", coef=repr(-gap.arm))
+    ET.SubElement(pull, "joint", joint=joint, coef=repr(-gap.arm))
     return {"joint": names[0], "gainprm": repr(spring), "biastype": "affine", "biasprm": f"0 {-spring!r} {-damping!r}"}
 
 
 def _slider(parent: ET.Element, name: str, mass: float, **limits: str) -> ET.Element:
     body = ET.SubElement(parent, "body", name=name)
     ET.SubElement(body, "inertial", mass=repr(mass), pos="0 0 0", diaginertia=" ".join([repr(mass)] * 3))
-    ET.SubElement(body, "joint", {"name": name, "type": "slide", "axis": "1 0 0"} | limits)
+    free = dict.fromkeys(("damping", "stiffness", "frictionloss", "armature"), "0")  # whatever the file's defaults are
+    ET.SubElement(body, "joint", {"name": name, "type": "slide", "axis": "1 0 0"} | free | limits)
     return body

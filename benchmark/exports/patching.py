@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees
@@ -62,11 +63,12 @@ class Robot:
 
 
 def patched(
-    robot: Robot, joint: Joint, attributes: Mapping[str, str], actuators: Sequence[Mapping[str, str]]
+    robot: Robot, joint: Joint, attributes: Mapping[str, str], actuators: Sequence[Mapping[str, str]], added: ET.Element
 ) -> tuple[str, str]:
     """Return the patched text and a unified diff; the armature is the inertia that the bodies do not have.
 
-    Raises UnusableInput where the joint is of another kind, its bodies are too heavy, or their gravity is their own.
+    `added` holds further elements by the sections that they belong to. Raises UnusableInput where the joint is of
+    another kind, its bodies are too heavy, or their gravity is their own.
     """
     if joint.kind != robot.kind:
         raise UnusableInput(f"--joint {robot.joint} is a {robot.kind}, the model is one of a {joint.kind}")
@@ -75,6 +77,8 @@ def patched(
         made["range"] = " ".join(repr(degrees(end)) for end in joint.limits)
     text = _edited(robot, made)
     text = _with_actuators(robot, text, actuators)
+    for section in added:
+        text = _with_elements(robot, text, section)
     names = str(robot.file), f"{robot.file.stem}_patched.xml"
     diff = difflib.unified_diff(robot.text.splitlines(True), text.splitlines(True), *names)
     return text, "".join(diff)
@@ -134,13 +138,29 @@ def _with_actuators(robot: Robot, text: str, actuators: Sequence[Mapping[str, st
         name = re.search(r"\sname\s*=\s*[\"']([^\"']*)", match[0])
         kept = dict(actuator) | ({"name": name[1]} if name else {})
         text = text[: match.start()] + _tag(kept) + text[match.end() :]
-    added = "".join(f"    {_tag(actuator)}\n" for actuator in actuators[len(there) :])
-    if not added:
+    return _at_end_of(robot, text, "actuator", [_tag(actuator) for actuator in actuators[len(there) :]])
+
+
+def _with_elements(robot: Robot, text: str, section: ET.Element) -> str:
+    """Put elements at the end of their section, so that joints that are there keep their places in qpos."""
+    bodies = section.tag == "worldbody" and len(section) > 0
+    if bodies and (lost := re.search(r"<key\b[^>]*\bqpos\b", _without_comments(text))):
+        line = text.count("\n", 0, lost.start()) + 1
+        raise UnusableInput(
+            f"--into {robot.file}: backlash adds joints, which the key in line {line} does not have; take it out"
+        )
+    ET.indent(section, level=1)
+    return _at_end_of(robot, text, section.tag, [ET.tostring(one, "unicode").rstrip() for one in section])
+
+
+def _at_end_of(robot: Robot, text: str, section: str, tags: Sequence[str]) -> str:
+    """Put tags at the end of a section, which is made where there is none."""
+    if not tags:
         return text
-    bare = _without_comments(text)
-    for end, lines in (("</actuator>", f"{added}  "), ("</mujoco>", f"  <actuator>\n{added}  </actuator>\n")):
+    bare, added = _without_comments(text), "".join(f"    {tag}\n" for tag in tags)
+    for end, made in ((f"</{section}>", f"{added}  "), ("</mujoco>", f"  <{section}>\n{added}  </{section}>\n")):
         if (at := bare.rfind(end)) >= 0:
-            return text[:at] + lines.removeprefix("  " if end == "</actuator>" else "") + text[at:]
+            return text[:at] + made.removeprefix("  " if section in end else "") + text[at:]
     raise UnusableInput(f"{robot.file} has no closing </mujoco>")
 
 

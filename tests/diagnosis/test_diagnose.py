@@ -32,7 +32,8 @@ def answers(diagnosis):
     return [{cause.effect, *(s.effect for s in cause.confounded_with)} for cause in diagnosis.causes]
 
 
-@pytest.mark.parametrize("attempt", [0, *(pytest.param(i, marks=pytest.mark.slow) for i in (1, 2))])
+@pytest.mark.slow
+@pytest.mark.parametrize("attempt", range(3))
 def test_an_effect_that_is_hidden_in_a_rig_is_named_first_or_suspected_if_the_reference_can_see_it(attempt):
     rig, effect, seed = hidden_somewhere()
     outcome = solve(Case(rig, effect, 1.0, noise=0.05, colour=0.0, seed=seed))

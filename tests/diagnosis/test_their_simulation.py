@@ -83,6 +83,7 @@ def test_a_right_simulation_lacks_nothing():
     assert (right.verdict, right.causes) == ("nothing_found", ())
 
 
+@pytest.mark.slow
 def test_a_simulation_with_nothing_but_wrong_numbers_in_its_linear_part_is_told_so():
     dataset = record("cart", {"dead_zone": 1.0}, 2)
     wrong = diagnose(dataset, simulated=simulation(dataset, "cart", {"dead_zone": 1.0}, 0.8), views_too=False)
@@ -99,6 +100,7 @@ def test_a_record_in_the_place_of_its_simulation_lacks_nothing():
     assert answer.to_json()["budget"]["v"]["unexplained"] is None
 
 
+@pytest.mark.slow
 def test_an_effect_that_only_the_simulation_has_is_named_as_that():
     dataset = record("cart", {"coulomb_friction": 1.0}, 3)
     answer = diagnose(dataset, simulated=simulation(dataset, "cart", {"quadratic_drag": 1.0}), views_too=False)
@@ -108,9 +110,9 @@ def test_an_effect_that_only_the_simulation_has_is_named_as_that():
 
 @pytest.mark.slow
 def test_nineteen_of_twenty_first_names_are_what_an_independent_simulation_lacks():
-    answers = {str(draw(number)): first_name_is_right(draw(number)) for number in range(60)}
+    answers = {str(draw(number)): first_name_is_right(draw(number)) for number in range(20)}
     wrong = [f"{case}: {said}" for case, (right, said) in answers.items() if not right]
-    assert len(wrong) <= 3, wrong
+    assert len(wrong) <= 1, wrong
 
 
 @pytest.fixture

@@ -13,7 +13,9 @@ from simgap.data.formats.plant_table import read_forces
 from simgap.data.simulated.rigs import hide
 from simgap.data.splits import assemble
 from simgap.exports import export as exports
+from simgap.exports import joint_runs
 from simgap.exports.export import export
+from simgap.exports.folders import read_folder
 from simgap.exports.joints import CHANGES, MJCF, URDF, effects_table
 from simgap.records import Channel, Channels, Experiment, UnusableInput
 from simgap.registry import EFFECTS, MODELS
@@ -21,6 +23,19 @@ from simgap.saved.archive import FittedOn, SavedModel
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 KNOWN = {"inertia": 0.3}
+ON_AN_ARM = {"mass": "1 kg", "arm": "0.2 m"}
+WHEEL = """
+<mujoco>
+  <default><joint damping="0.5"/></default>
+  <worldbody>
+    <body>
+      <joint name="axle" axis="0 0 1"/>
+      <inertial mass="1" pos="0 0 0" diaginertia="0.01 0.01 0.01"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="axle"/></actuator>
+</mujoco>
+"""
 ROBOT = """
 <mujoco model="robot">
   <!-- <joint name="rail"/> is below -->
@@ -71,8 +86,8 @@ def test_mujoco_moves_the_joint_as_our_simulation(rig, effects, forms, limit, tm
         assert done.passed and done.limit == limit, str(done)
 
 
-@pytest.mark.parametrize("stiffness", [0.0, 4.0])
-def test_a_second_joint_holds_a_command_back_as_backlash_does(stiffness, tmp_path):
+def with_backlash(stiffness):
+    """A drive with play before it, saved, a record of it, and how far the play takes the motion from one without."""
     model = MODELS["greybox"]()
     model.plants = grey_box("position", [EFFECTS["backlash"]()], [[0.8]]).plants
     model.plants[0].estimate.theta[1] = stiffness
@@ -82,13 +97,38 @@ def test_a_second_joint_holds_a_command_back_as_backlash_does(stiffness, tmp_pat
     y_hat = model.simulate(u[None], np.zeros((1, 6, 1)))[0]
     x = Experiment("run", u, np.concatenate([np.zeros((6, 1)), y_hat]), DT)
     data = assemble("rig", ((x,), (x,), (x,)), channels, 6, "rig")
-    saved = SavedModel("greybox", model, FittedOn.of(data))
-    done = export(saved, data, "mjcf", tmp_path / "out", known={"mass": "1 kg", "arm": "0.2 m"})
-    assert done.passed and done.limit == 3e-2, str(done)
     plain = grey_box("position").plants[0]
     plain.estimate.theta[1] = stiffness
     without = plain.simulate(u[None], x.y[None, :6])[0]
-    assert np.std(without - y_hat) > 0.1 * np.std(y_hat), "the gap makes no difference"
+    return SavedModel("greybox", model, FittedOn.of(data)), data, np.std(without - y_hat) / np.std(y_hat)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 4.0])
+def test_a_second_joint_holds_a_command_back_as_backlash_does(stiffness, tmp_path):
+    saved, data, difference = with_backlash(stiffness)
+    assert difference > 0.1, "the gap makes no difference"
+    done = export(saved, data, "mjcf", tmp_path / "out", known=ON_AN_ARM)
+    assert done.passed and done.limit == 3e-2, str(done)
+
+
+def test_backlash_goes_into_the_users_file_and_holds_back_there_too(tmp_path):
+    saved, data, _ = with_backlash(4.0)
+    (tmp_path / "wheel.xml").write_text(WHEEL)
+    export(saved, data, "mjcf", tmp_path / "out", known=ON_AN_ARM, into=tmp_path / "wheel.xml", joint="axle")
+    about = read_folder(tmp_path / "out")
+    model = joint_runs.load(tmp_path / "out" / "wheel_patched.xml")
+    assert [model.joint(i).name for i in range(3)] == ["axle", "axle_stem0", "axle_follower0"]
+    (record,) = about.records
+    joint = joint_runs.read_joint(tmp_path / "out") | {"substeps": round(DT / model.opt.timestep)}
+    assert record.difference(joint_runs.run(model, joint, about, record, effort=False)) < 3e-2
+
+
+def test_keys_that_lack_the_joints_of_a_backlash_are_refused(tmp_path):
+    saved, data, _ = with_backlash(4.0)
+    keys = '<keyframe><key name="home" qpos="0"/></keyframe></mujoco>'
+    (tmp_path / "wheel.xml").write_text(WHEEL.replace("</mujoco>", keys))
+    with pytest.raises(UnusableInput, match="which the key in line 11 does not have"):
+        export(saved, data, "mjcf", tmp_path / "out", known=ON_AN_ARM, into=tmp_path / "wheel.xml", joint="axle")
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def test_a_sine_is_not_the_velocity_of_its_own_derivative():
     [
         ("cart", "coulomb_friction", "velocity"),
         pytest.param("stage", "coulomb_friction", "position", marks=pytest.mark.slow),
-        ("tank", "sqrt_outflow", "level"),
+        pytest.param("tank", "sqrt_outflow", "level", marks=pytest.mark.slow),
     ],
 )
 def test_the_kind_is_the_one_whose_plant_explains_the_records_with_the_hidden_effect(rig, effect, kind):

@@ -14,6 +14,7 @@ def joint():
     return field.hide("joint_link", {}, 0.005, 0.8, 105015)
 
 
+@pytest.mark.slow
 def test_a_joint_that_swings_is_a_matter_of_order_and_no_delay(joint):
     (one,) = identify(joint.training)
     assert one.linear is not None

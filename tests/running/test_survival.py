@@ -73,11 +73,11 @@ def kill_at_random(command, out, times, draw):
     return survived
 
 
-@pytest.mark.parametrize("kills", [6, pytest.param(100, marks=pytest.mark.slow)])
-def test_killed_at_random_moments_the_next_run_finishes_what_is_missing(suite, tmp_path, kills):
+@pytest.mark.slow
+def test_killed_at_random_moments_the_next_run_finishes_what_is_missing(suite, tmp_path):
     out, seed = tmp_path / "out", random.SystemRandom().randrange(1 << 30)
     chosen = suite(*JOBS, seeds=2)
-    survived = kill_at_random([*RUN, "run", chosen, "--jobs", "2", "--out", str(out)], out, kills, random.Random(seed))
+    survived = kill_at_random([*RUN, "run", chosen, "--jobs", "2", "--out", str(out)], out, 100, random.Random(seed))
     print(f"seed {seed}: kills {survived}")
     complete_and_single(out, simgap.run(chosen, jobs=2, out=out))
 
@@ -95,6 +95,7 @@ def test_a_killed_worker_is_a_row_and_the_run_goes_on(suite, tmp_path):
     assert "was ended by SIGKILL" in rows["Waits"].message
 
 
+@pytest.mark.slow
 def test_two_runs_on_one_store_leave_every_row_once(suite, tmp_path):
     out = tmp_path / "out"
     chosen = suite(*JOBS, seeds=2)
@@ -104,6 +105,7 @@ def test_two_runs_on_one_store_leave_every_row_once(suite, tmp_path):
     complete_and_single(out, simgap.run(chosen, out=out))
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_ends_the_run_with_a_sentence_and_loses_nothing(suite, tmp_path):
     out = tmp_path / "out"
     chosen = suite(*JOBS, seeds=2)

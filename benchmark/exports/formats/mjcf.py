@@ -18,7 +18,6 @@ from simgap.exports.joints import MJCF, STANDARD_GRAVITY, Joint, armature, body
 from simgap.exports.patching import Robot, patched
 from simgap.exports.subjects import CheckRecord, Subject
 from simgap.exports.texts import heading
-from simgap.records import UnusableInput
 
 FILE = "model.xml"
 refusal, missing, prepare = joint_models.refusal, joint_runs.missing, joint_models.steady
@@ -70,11 +69,13 @@ def actuators(joint: Joint, name: str, step: float) -> list[dict[str, str]]:
 
 def patch(subject: Subject, file: Path, name: str) -> dict[str, str]:
     """Put the joint into the user's XML: the file and patch.diff, by their names. Raises UnusableInput."""
-    joint, robot = joint_of(subject, MJCF, "mjcf"), Robot.read(file, name)
-    if any(one.get("gap") for one in joint.inputs):
-        raise UnusableInput("--into: backlash needs bodies of its own; take them from model.xml, without --into")
-    made = joint_attributes(joint, robot.timestep), actuators(joint, name, robot.timestep)
-    text, diff = patched(robot, joint, *made)
+    gaps, joint = gaps_of(subject, joint_of(subject, MJCF, "mjcf"))
+    robot = Robot.read(file, name)
+    made, added = actuators(joint, name, robot.timestep), ET.Element("mujoco")
+    ET.SubElement(added, "worldbody")
+    for gap in gaps:
+        made[gap.channel] |= add_gap(added, gap, robot.timestep, name, f"{name}_")
+    text, diff = patched(robot, joint, joint_attributes(joint, robot.timestep), made, added)
     return {f"{file.stem}_patched.xml": text, "patch.diff": diff}
 
 
@@ -99,7 +100,7 @@ def write(subject: Subject, folder: Path) -> None:
     section = ET.SubElement(root, "actuator")
     made = actuators(joint, "joint", step)
     for gap in gaps:
-        made[gap.channel] |= add_gap(root, gap, step)
+        made[gap.channel] |= add_gap(root, gap, step, "joint")
     for actuator in made:
         ET.SubElement(section, "general", actuator)
     joint_runs.write(root, folder / FILE, subject, joint, lambda one: joint_of(one, MJCF, "mjcf"))
