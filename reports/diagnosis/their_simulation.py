@@ -8,6 +8,7 @@ from simgap.findings import Cause, Findings, Value
 from simgap.reports.diagnosis import numbers
 from simgap.wording import amount, number, percent
 
+HARDLY = 0.1  # of the plain model's squared error
 HOLDS = {
     "missing": "Your simulation does not have it.",
     "other size": "Your simulation has it, in another size.",
@@ -28,10 +29,14 @@ def owner_of(findings: Findings) -> str:
 def nothing_found(findings: Findings) -> str:
     """Say in a sentence that no effect is missing, or none but the right numbers of somebody's linear part."""
     if not findings.simulation:
-        return (
-            "Nothing found: no effect of the catalogue makes the plain linear model simulate these data better, and "
-            "the input predicts hardly anything more of its error."
-        )
+        better = "no effect of the catalogue makes the plain linear model simulate these data better"
+        learnable = max((budget.learnable for budget in findings.budget), default=0.0)
+        if learnable > HARDLY:
+            return (
+                f"Nothing is named: {better}, although the input still predicts {percent(learnable)} of its squared "
+                "error on the test experiments."
+            )
+        return f"Nothing found: {better}, and the input predicts hardly anything more of its error."
     if not findings.simulation.linear_differs:
         return "Nothing found: your simulation lacks nothing that these data show."
     return (

@@ -82,10 +82,14 @@ def evidence(cause: Cause) -> str:
         if cause.per_experiment
         else ""
     )
-    return (
-        f"It explains {percent(cause.evidence)} of the plain model's squared error in training (log-likelihood ratio "
-        f"{number(cause.log_likelihood_ratio)}); {held_out}.{remark}"
+    ratio = number(cause.log_likelihood_ratio)
+    likely = (
+        f" (log-likelihood ratio {ratio})"
+        if cause.log_likelihood_ratio > 0
+        else f", but only of free runs: the one-step errors are no likelier with it (log-likelihood ratio {ratio})"
     )
+    explained = f"It explains {percent(cause.evidence)} of the plain model's squared error in training{likely}"
+    return f"{explained}; {held_out}.{remark}"
 
 
 def deciding(cause: Cause, findings: Findings) -> str:

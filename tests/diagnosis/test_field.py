@@ -67,7 +67,6 @@ def rates(rig, first_seed, strengths=(1.0, 0.5, 0.25), clean=5, every=1):
 @pytest.mark.parametrize("rig", RIGS)
 def test_the_rates_of_a_machine_are_those_that_were_measured(rig):
     counts = rates(rig, first_seed=300_000 + 1000 * list(RIGS).index(rig), every=2)
-    print(rig, dict(counts))
     assert counts["right"] >= counts["hidden"] - MISSED.get(rig, 1)
     assert counts["named"] == 0
     assert counts["suspected"] <= 1

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simgap.findings import Value
+from simgap.findings import Budget, Value
 from simgap.reports.diagnosis.numbers import interval, numbers
 from simgap.reports.diagnosis.text import diagnosis_text
 
@@ -67,6 +67,22 @@ def test_nothing_found_names_no_cause_and_no_gain(nothing_found):
     assert "cart: Nothing found:" in text
     assert "Cause 1" not in text
     assert "->" not in text
+
+
+def test_what_is_learnable_without_a_name_is_not_called_hardly_anything(nothing_found):
+    budget = (Budget("x", {}, 0.57, None, 0.43),)
+    assert in_one_line(diagnosis_text(replace(nothing_found, budget=budget))).startswith(
+        "cart: Nothing is named: no effect of the catalogue makes the plain linear model simulate these data better, "
+        "although the input still predicts 57 % of its squared error on the test experiments. Plain"
+    )
+
+
+def test_a_cause_that_explains_free_runs_alone_says_so(named):
+    cause = replace(named.causes[0], log_likelihood_ratio=-814.0)
+    assert (
+        "It explains 91 % of the plain model's squared error in training, but only of free runs: the one-step errors "
+        "are no likelier with it (log-likelihood ratio -814); on held-out data"
+    ) in in_one_line(diagnosis_text(replace(named, causes=(cause,))))
 
 
 def test_a_suspect_is_called_a_suspect_with_its_gain_and_what_would_decide(suspected):
