@@ -15,6 +15,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from simgap.diagnosis.gains import share_with_interval
+from simgap.error_views.correlation import correlation_time
 
 EXPERIMENTS = (1, 2, 3, 4, 15)
 SAMPLES = (100, 300, 1000)
@@ -37,8 +38,10 @@ def found(
     experiment = np.repeat(np.arange(experiments), samples)
     above = np.zeros(len(GAINS))
     for _ in range(repetitions):
-        before, after = (errors(rng, experiments, samples, memory).ravel() ** 2 for _ in range(2))
-        above += [share_with_interval(before, after * (1 - gain) ** 2, experiment)[1] > 0 for gain in GAINS]
+        both = [errors(rng, experiments, samples, memory).ravel() for _ in range(2)]
+        known = max(correlation_time(e, [samples] * experiments, 0)[0] for e in both)
+        before, after = (e**2 for e in both)
+        above += [share_with_interval(before, after * (1 - gain) ** 2, experiment, known)[1] > 0 for gain in GAINS]
     return list(above / repetitions)
 
 

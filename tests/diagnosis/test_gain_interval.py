@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simgap.diagnosis.gains import block_starts, measure, share_with_interval
+from simgap.error_views.correlation import correlation_time
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 STUDY = runpy.run_path(str(Path(__file__).with_name("interval_study.py")))
@@ -55,6 +56,17 @@ def test_the_memory_of_errors_widens_the_interval():
     # Squares of errors with rho_k = exp(-k / 20) have exp(-k / 10): 20 of them count as one, with exp(-2 k) 1.3.
     widths = [np.mean([width(memory) for _ in range(40)]) for memory in (1, 20)]
     assert 3.0 < widths[1] / widths[0] < 7.0
+
+
+@pytest.mark.parametrize(("slow", "shown"), [(0.0, True), (0.1, False)])
+def test_a_gain_in_every_block_is_shown_whatever_their_sizes_but_a_slow_error_is_seen_once(slow, shown):
+    rng = np.random.default_rng(6)
+    size = np.exp(np.linspace(-3, 0, 800))  # so that the memory of its square is as long as the record
+    before = slow + size * STUDY["errors"](rng, 1, 800, 20)[0]
+    after = 0.1 * slow + 0.002 * rng.standard_normal(800)
+    memory = max(correlation_time(e, [800], 0)[0] for e in (before, after))
+    assert share_with_interval(before**2, after**2, whole(800))[1] <= 0
+    assert (share_with_interval(before**2, after**2, whole(800), memory)[1] > 0.5) == shown
 
 
 def test_the_order_of_experiments_and_the_unit_of_the_output_do_not_matter():
