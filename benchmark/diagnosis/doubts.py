@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.identification import Identified
 from simgap.greybox.selection import Selection
 from simgap.records import Channels, Experiment
@@ -45,14 +46,21 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
     """Tell in a sentence that a linear model of another order needs no effect to do as well."""
     if one.linear is None:
         return None
-    selection = one.selection
-    name, plain = channels.outputs[selection.baseline.outputs[0]].name, selection.baseline.plant
-    effects = [term.effect.title for term in selection.trial.terms]
+    baseline, chosen = one.selection.baseline, one.selection.trial
+    name = channels.outputs[baseline.outputs[0]].name
+    effects = [term.effect.title for term in chosen.terms]
     helped = f" with {' and '.join(effects)}" if effects else ""
-    return (
-        f"A linear model of order {one.linear.plant.order} simulates held-out {name} at least as well as the plain one "
-        f"of order {plain.order}{helped}, so that no effect can be held responsible for what is wrong."
+    rival, plain = f"A linear model of order {one.linear.plant.order}", f"the plain one of order {baseline.plant.order}"
+    nothing = "so that no effect can be held responsible for what is wrong"
+    of_linear, with_effects = (
+        block_errors(fit, baseline.valid, baseline.n_init) for fit in (one.linear.estimate, chosen.estimate)
     )
+    if effects and in_most(of_linear - with_effects):
+        return (
+            f"{rival} has likelier one-step errors in training than {plain}{helped}, though it simulates held-out "
+            f"{name} worse. Neither is the machine, {nothing}."
+        )
+    return f"{rival} simulates held-out {name} at least as well as {plain}{helped}, {nothing}."
 
 
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:

@@ -10,6 +10,7 @@ from simgap.cores import on_cores
 from simgap.greybox.additions import Extended, as_special_case, extend, key_of, with_one_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
+from simgap.greybox.held_out import in_most
 from simgap.greybox.noise import log_likelihood
 from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
@@ -146,19 +147,32 @@ class _Search:
     def exchange(self, trial: Trial) -> Trial:
         """Try every other effect in the place of each, because the first choice was made without the others.
 
-        Where the search ran into the largest number of effects, no exchange makes them the explanation.
+        A choice that errs less on held-out data, though it is less likely in training, is a way to one of two others:
+        a curve and a friction are the best in the place of each other where both stand for a dead zone and unequal
+        gains. Where the search ran into the largest number of effects, no exchange makes them the explanation.
         """
         for term in trial.terms if 1 < len(trial.terms) < self.baseline.plant.most_terms else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
-            stage(f"Trying others in the place of {term.effect.title}")
-            rest = self._without(trial, term)
-            fits = with_one_more(self.baseline, rest.estimate, self.extended)
-            trials = assessed(self.baseline, fits, self.noise_order)
-            trials = ranked([other for other in trials if significant(self.baseline, rest, other)])
-            if trials and trials[0].score > trial.score + BETTER:
-                trial = self.backward(trials[0])
+            found = self._in_place_of(term, trial)
+            trial = self._better(trial, found)
+            on_the_way = next((other for other in found if in_most(trial.blocks - other.blocks)), None)
+            if on_the_way:
+                kept = [one for one in trial.terms if one in on_the_way.terms]
+                found = ranked([other for one in kept for other in self._in_place_of(one, on_the_way)])
+                trial = self._better(trial, found)
         return trial
+
+    def _better(self, trial: Trial, found: Sequence[Trial]) -> Trial:
+        return self.backward(found[0]) if found and found[0].score > trial.score + BETTER else trial
+
+    def _in_place_of(self, term: Term, trial: Trial) -> list[Trial]:
+        """List the models with another effect in the place of one, the best first."""
+        stage(f"Trying others in the place of {term.effect.title}")
+        rest = self._without(trial, term)
+        fits = with_one_more(self.baseline, rest.estimate, self.extended)
+        trials = assessed(self.baseline, fits, self.noise_order)
+        return ranked([other for other in trials if significant(self.baseline, rest, other)])
 
     def _assess(self, estimate: Estimate) -> Trial:
         return assess(self.baseline, estimate, self.noise_order)

@@ -23,7 +23,7 @@ class AsymmetricGain(InputEffect):
         "halves of a power stage, a single-acting brake."
     )
     reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
-    place_in_chain: ClassVar[int] = 30
+    place_in_chain: ClassVar[int] = 58
     shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "sign of velocity")
     confounders: ClassVar[dict[str, str]] = {
         "constant_load": (
