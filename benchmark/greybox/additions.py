@@ -15,7 +15,7 @@ from simgap.greybox.machine import StandIn
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
 from simgap.greybox.score_test import STARTS, Scored, candidates, score_tests, with_term
-from simgap.greybox.terms import Term
+from simgap.greybox.terms import Term, in_each_order
 from simgap.greybox.unfolding import unfolded
 
 # Score tests below this log-likelihood ratio are not worth a refit.
@@ -137,9 +137,17 @@ def extend(
 ) -> Estimate | None:
     """Fit the model with one effect more, from the starts with the best scores; None if none is worth it.
 
-    The effect is tested here where it has not been `scored`.
+    The effect is tested here where it has not been `scored`. Where effects may act in either order, the better one is
+    taken.
     """
-    plant = with_term(estimate.plant, term)
+    orders = in_each_order(with_term(estimate.plant, term).terms)
+    fits = [_extend(baseline, estimate, estimate.plant.having(terms), term, scored, max_steps) for terms in orders]
+    return min((fit for fit in fits if fit is not None), key=lambda fit: fit.squares, default=None)
+
+
+def _extend(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, scored: Sequence[Scored] | None, max_steps: int
+) -> Estimate | None:
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
     if term.effect.moves_poles and plant.machine is None:

@@ -119,7 +119,7 @@ class Plant:
 
     def having(self, terms: Sequence[Term]) -> Plant:
         """Return the same plant with these terms, in the order in which signals pass them."""
-        return replace(self, terms=tuple(sorted(terms, key=lambda term: (term.effect.place_in_chain, term.key))))
+        return replace(self, terms=tuple(sorted(terms, key=lambda term: (term.place, term.key))))
 
     @cached_property
     def layout(self) -> Layout:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -14,10 +15,17 @@ from simgap.greybox.samples import OFFSET
 
 @dataclass(frozen=True)
 class Term:
-    """An effect where it acts: on which input, or on which output."""
+    """An effect where it acts: on which input, or on which output; `late`, where its signal may pass it later."""
 
     effect: Effect
     channel: int = 0
+    late: bool = field(default=False, compare=False)
+
+    @property
+    def place(self) -> int:
+        """Where in the chain of effects a signal passes this one."""
+        late = self.effect.late_place if self.late else None
+        return self.effect.place_in_chain if late is None else late
 
     @property
     def key(self) -> tuple[str, int]:
@@ -27,6 +35,18 @@ class Term:
     def replaces(self, other: Term) -> bool:
         """Tell whether this effect contains the other one as a special case."""
         return other.effect.name in self.effect.contains
+
+
+def in_each_order(terms: Sequence[Term]) -> list[list[Term]]:
+    """List the terms as they are, and with each later or earlier in its chain where others stand in between."""
+    orders = [list(terms)]
+    for i, term in enumerate(terms):
+        moved = replace(term, late=not term.late)
+        first, last = sorted((term.place, moved.place))
+        chain = [t for t in terms if (t.effect.port, t.channel) == (term.effect.port, term.channel)]
+        if any(first < other.place < last for other in chain):
+            orders.append([*terms[:i], moved, *terms[i + 1 :]])
+    return orders
 
 
 @dataclass(frozen=True, eq=False)

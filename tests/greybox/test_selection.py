@@ -84,3 +84,22 @@ def test_every_effect_of_the_answer_passes_alone_against_the_rest(rig, effects):
 def test_a_special_case_of_the_best_effect_is_fitted_from_its_plant_too():
     # A valve that sticks and does not jump is play; seen from the poles of the plain model, play fits worse.
     assert passing_alone(hide("tanks", {"backlash": 1.0}, noise=0.05, seed=304).training) == {"backlash"}
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_unequal_gains_are_found_before_a_dead_zone_and_behind_it(late):
+    rng = np.random.default_rng(5)
+    u = steps(rng, (4, 150))
+
+    def unequal(w):
+        return w * np.where(w > 0, 1.3, 0.7)
+
+    def narrowed(w):
+        return np.sign(w) * np.maximum(np.abs(w) - 0.2, 0.0)
+
+    arrived = unequal(narrowed(u)) if late else narrowed(unequal(u))
+    y = free_run(velocity(), arrived, 0.1)[0] + 0.01 * rng.standard_normal((4, 150, 1))
+    made = experiments(u, y, 0.1)
+    found = sizes_of(with_effects(plain_search(made[:3], made[3:], "velocity"), "asymmetric_gain", "dead_zone"))
+    assert found["asymmetric_gain"] == pytest.approx(0.3, rel=0.03)
+    assert found["dead_zone"] == pytest.approx(0.2, rel=0.03)

@@ -23,7 +23,8 @@ class AsymmetricGain(InputEffect):
         "halves of a power stage, a single-acting brake."
     )
     reference: ClassVar[str] = "Jelali and Kroll, Hydraulic Servo-systems, 2003, sec. 4.2"
-    place_in_chain: ClassVar[int] = 58
+    place_in_chain: ClassVar[int] = 30
+    late_place: ClassVar[int | None] = 58  # early: halves of a power stage; late: areas of a cylinder
     shows_in: ClassVar[tuple[ViewName, ...]] = ("input", "sign of velocity")
     confounders: ClassVar[dict[str, str]] = {
         "constant_load": (

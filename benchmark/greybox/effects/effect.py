@@ -131,6 +131,7 @@ class Effect(ABC):
     substeps: ClassVar[int] = 1
     # Where several effects act on one signal, it passes them in ascending order.
     place_in_chain: ClassVar[int] = 990
+    late_place: ClassVar[int | None] = None  # where else it may stand, if the records say so
     # Its parameters belong to one experiment and cannot be forecast.
     per_experiment: ClassVar[bool] = False
     # Adds value * t^power to the reading, with a value of its own in every experiment; None: no such effect.
