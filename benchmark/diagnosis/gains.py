@@ -127,7 +127,7 @@ def _share_of_most(
     that a slow error that both simulations share is seen once. Where an error is large in one half of a record for a
     reason, the memory of its square is found to be the record itself, and no scatter of blocks tells of a gain.
     """
-    starts = block_starts(lengths, max(memory, len(before) / BLOCKS))
+    starts = block_starts(lengths, max(memory, len(before) / BLOCKS), least=1)
     ratios = np.sort(np.add.reduceat(after, starts) / np.add.reduceat(before, starts))
     above = int(binom.ppf(0.025, len(starts), 0.5)) - 1  # blocks that may lie above the bound
     return 1 - math.sqrt(ratios[-1 - above]) if above >= 0 else -math.inf
@@ -163,12 +163,12 @@ def _least_share(
     return 1 - math.sqrt(high)
 
 
-def block_starts(lengths: Int[np.ndarray, " E"], shortest: float) -> Int[np.ndarray, " m"]:
+def block_starts(lengths: Int[np.ndarray, " E"], shortest: float, least: int = 2) -> Int[np.ndarray, " m"]:
     """Cut experiments into equal blocks of at least so many samples; one that is shorter stays whole.
 
-    Few experiments are cut in two at least, because the scatter of few blocks is hardly known.
+    Few experiments are cut in `least` blocks even so: in two, where the scatter of few blocks would hardly be known.
     """
-    counts = np.maximum(lengths // shortest, 2 if len(lengths) < FEW else 1).astype(int)
+    counts = np.maximum(lengths // shortest, least if len(lengths) < FEW else 1).astype(int)
     counts = np.minimum(counts, lengths)
     ends = np.cumsum(lengths)
     starts = [

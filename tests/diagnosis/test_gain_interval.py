@@ -69,6 +69,12 @@ def test_a_gain_in_every_block_is_shown_whatever_their_sizes_but_a_slow_error_is
     assert (share_with_interval(before**2, after**2, whole(800), memory)[1] > 0.5) == shown
 
 
+def test_of_few_experiments_no_block_is_shorter_than_asked_but_where_two_are_wanted():
+    lengths = np.array([200, 200, 200])
+    assert block_starts(lengths, 150.0, least=1).tolist() == [0, 200, 400]
+    assert block_starts(lengths, 150.0).tolist() == [0, 100, 200, 300, 400, 500]
+
+
 def test_the_order_of_experiments_and_the_unit_of_the_output_do_not_matter():
     rng = np.random.default_rng(2)
     before, after = (STUDY["errors"](rng, 5, 200, 10) ** 2 for _ in range(2))  # [5, 200]
