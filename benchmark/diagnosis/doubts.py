@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.identification import Identified
 from simgap.greybox.selection import Selection
 from simgap.records import Channels, Experiment
@@ -50,12 +49,9 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
     name = channels.outputs[baseline.outputs[0]].name
     effects = [term.effect.title for term in chosen.terms]
     helped = f" with {' and '.join(effects)}" if effects else ""
-    rival, plain = f"A linear model of order {one.linear.plant.order}", f"the plain one of order {baseline.plant.order}"
+    rival, plain = f"A linear model of order {one.linear.baseline.plant.order}", f"the plain one of order {baseline.plant.order}"
     nothing = "so that no effect can be held responsible for what is wrong"
-    of_linear, with_effects = (
-        block_errors(fit, baseline.valid, baseline.n_init) for fit in (one.linear.estimate, chosen.estimate)
-    )
-    if effects and in_most(of_linear - with_effects):
+    if effects and one.linear.errs_more:
         return (
             f"{rival} has likelier one-step errors in training than {plain}{helped}, though it simulates held-out "
             f"{name} worse. Neither is the machine, {nothing}."

@@ -49,10 +49,9 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of scale
     rmse = [np.where(error < GROWN, error * scale, np.inf) for error in rmse]
     loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
-    experiment = np.repeat(np.arange(len(dataset.test)), [len(x.y[n:]) for x in dataset.test])
-    lengths = np.bincount(experiment)
-    memory = max(correlation_time(signal, lengths[lengths > 0], 0)[0] for error in errors for signal in error.T)
-    shares = share_with_interval(loss_before, loss_after, experiment, memory)
+    lengths = np.array([len(x) - n for x in dataset.test if len(x) > n])
+    memory = max(correlation_time(signal, lengths, 0)[0] for error in errors for signal in error.T)
+    shares = share_with_interval(loss_before, loss_after, lengths, memory)
     share, low, high = (value if value > -GROWN else -np.inf for value in shares)
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
@@ -75,10 +74,10 @@ def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[
 def share_with_interval(
     before: Float[np.ndarray, " N"],
     after: Float[np.ndarray, " N"],
-    experiment: Int[np.ndarray, " N"],
+    lengths: Int[np.ndarray, " E"],
     memory: float = math.inf,
 ) -> tuple[float, float, float]:
-    """Compute the gain from the losses (squared errors) of all test samples, and its 95 % interval.
+    """Compute the gain from the losses (squared errors) of all test samples of E experiments, and its 95 % interval.
 
         share = 1 - sqrt(mean(after) / mean(before)),   d_t = after_t / mean(after) - before_t / mean(before)
         variance of log(mean(after) / mean(before)) = m / (m - 1) sum_i (sum_{t in i} d_t)^2 / N^2 / (1 - tau / 2 L)
@@ -96,9 +95,7 @@ def share_with_interval(
     """
     losses = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
     d = losses[1] - losses[0]
-    lengths = np.bincount(experiment)
-    lengths = lengths[lengths > 0]
-    tau, _ = correlation_time(d - means(d, experiment), lengths, len(lengths))
+    tau, _ = correlation_time(d - means(d, np.repeat(np.arange(len(lengths)), lengths)), lengths, len(lengths))
     starts = block_starts(lengths, max(2 * tau, len(d) / BLOCKS))
     m = len(starts)
     mean_length = len(d) / m

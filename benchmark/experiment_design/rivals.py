@@ -94,7 +94,7 @@ def question_of(identified: Identified) -> Question:
         if behind - least < CONFOUNDED
     ]
     if identified.linear is not None:
-        linear = identified.linear
+        linear = identified.linear.baseline
         title = f"a linear model of order {linear.plant.order}"
         rivals.append(rival_of(title, linear.estimate, linear, noise, 0.0))
     if len(rivals) > 1:

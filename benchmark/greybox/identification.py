@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from simgap.greybox.baseline import Baseline
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
-from simgap.greybox.linear_rival import linear_rival
+from simgap.greybox.linear_rival import LinearRival, linear_rival
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
@@ -36,7 +35,7 @@ class Identified:
     selection: Selection
     plant: FittedPlant
     settled: Settled | None = None  # what its output is, where nobody had said it
-    linear: Baseline | None = None  # the linear model that does as well
+    linear: LinearRival | None = None  # the linear model that does as well
 
     @cached_property
     def plain(self) -> FittedPlant:
@@ -61,7 +60,7 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
             stage("Comparing with linear models of other orders")
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             linear = linear_rival(data, of_kind, selection)
-        best = (linear.estimate, linear) if linear else (selection.trial.estimate, selection.baseline)
+        best = (linear.baseline.estimate, linear.baseline) if linear else (selection.trial.estimate, selection.baseline)
         identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
     return identified
 

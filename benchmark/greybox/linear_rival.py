@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.held_out import block_errors, in_most
@@ -16,7 +17,18 @@ from simgap.records import Channels, TrainingSet
 BEYOND = 0.1
 
 
-def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> Baseline | None:
+@dataclass(frozen=True, eq=False)
+class LinearRival:
+    """A linear model that the effects do not beat, and whether it errs more than they do in most held-out blocks.
+
+    Then its one-step errors in training are likelier all the same.
+    """
+
+    baseline: Baseline
+    errs_more: bool
+
+
+def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> LinearRival | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
     What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear
@@ -38,6 +50,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
-        return linear if better and gain.mean() > BEYOND * (without.mean() - with_effects.mean()) else None
+        better = better and gain.mean() > BEYOND * (without.mean() - with_effects.mean())
+        return LinearRival(linear, errs_more=False) if better else None
     beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    return None if beaten else linear
+    return None if beaten else LinearRival(linear, errs_more=in_most(-gain))

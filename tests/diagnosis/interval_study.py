@@ -35,13 +35,13 @@ def found(
 ) -> list[float]:
     """Compute for each true gain how often the interval lies above zero, from the same draws."""
     rng = np.random.default_rng((experiments, samples, memory))
-    experiment = np.repeat(np.arange(experiments), samples)
+    lengths = np.full(experiments, samples)
     above = np.zeros(len(GAINS))
     for _ in range(repetitions):
         both = [errors(rng, experiments, samples, memory).ravel() for _ in range(2)]
-        known = max(correlation_time(e, [samples] * experiments, 0)[0] for e in both)
+        known = max(correlation_time(e, lengths, 0)[0] for e in both)
         before, after = (e**2 for e in both)
-        above += [share_with_interval(before, after * (1 - gain) ** 2, experiment, known)[1] > 0 for gain in GAINS]
+        above += [share_with_interval(before, after * (1 - gain) ** 2, lengths, known)[1] > 0 for gain in GAINS]
     return list(above / repetitions)
 
 

@@ -12,8 +12,8 @@ import pytest
 from simgap.data.simulated.field import RIGS, hide, suitable
 from simgap.diagnosis.diagnose import diagnose
 
-# Hidden effects of each machine that are not named first, as measured, and one more; the aim is 1 of 20.
-MISSED = {"joint_motor": 2, "axis_open": 2}
+# Hidden effects of each machine that are not named first, as measured on those cases; the aim is 1 of 20.
+MISSED = {"heat_loop": 1, "axis": 1, "axis_open": 1, "joint_link": 1}
 
 
 def named(answer):
@@ -67,6 +67,6 @@ def rates(rig, first_seed, strengths=(1.0, 0.5, 0.25), clean=5, every=1):
 @pytest.mark.parametrize("rig", RIGS)
 def test_the_rates_of_a_machine_are_those_that_were_measured(rig):
     counts = rates(rig, first_seed=300_000 + 1000 * list(RIGS).index(rig), every=2)
-    assert counts["right"] >= counts["hidden"] - MISSED.get(rig, 1)
+    assert counts["right"] >= counts["hidden"] - MISSED.get(rig, 0)
     assert counts["named"] == 0
     assert counts["suspected"] <= 1

@@ -16,10 +16,6 @@ STUDY = runpy.run_path(str(Path(__file__).with_name("interval_study.py")))
 LOSSES = st.one_of(st.just(1e-18), st.floats(1e-12, 1e6), st.just(1e120))
 
 
-def whole(*lengths):
-    return np.repeat(np.arange(len(lengths)), lengths)
-
-
 def white(rng, samples, size=1.0):
     return (size * rng.standard_normal(samples)) ** 2
 
@@ -30,7 +26,7 @@ def test_the_interval_holds_the_gain_whatever_the_losses(data, lengths):
     before, after = (
         np.array(data.draw(st.lists(LOSSES, min_size=sum(lengths), max_size=sum(lengths)))) for _ in range(2)
     )
-    share, low, high = share_with_interval(before, after, whole(*lengths))
+    share, low, high = share_with_interval(before, after, np.array(lengths))
     assert low <= share <= high <= 1.0
     assert share == pytest.approx(max(1 - np.sqrt(after.mean() / before.mean()), 1 - np.exp(100.0)), rel=1e-9, abs=1e-9)
 
@@ -40,7 +36,7 @@ def test_of_white_errors_the_interval_is_as_wide_as_theory_says():
     rng = np.random.default_rng(0)
     widths = []
     for _ in range(100):
-        _, low, high = share_with_interval(white(rng, 4000), white(rng, 4000), whole(1000, 1000, 1000, 1000))
+        _, low, high = share_with_interval(white(rng, 4000), white(rng, 4000), np.full(4, 1000))
         widths.append(0.5 * np.log((1 - low) / (1 - high)) / 0.5)
     assert np.mean(widths) == pytest.approx(2.13 * np.sqrt(4 / 4000), rel=0.15)  # Student's t with 15 degrees
 
@@ -50,7 +46,7 @@ def test_the_memory_of_errors_widens_the_interval():
 
     def width(memory):
         before, after = (STUDY["errors"](rng, 4, 1000, memory).ravel() ** 2 for _ in range(2))
-        _, low, high = share_with_interval(before, after, whole(1000, 1000, 1000, 1000))
+        _, low, high = share_with_interval(before, after, np.full(4, 1000))
         return np.log((1 - low) / (1 - high))
 
     # Squares of errors with rho_k = exp(-k / 20) have exp(-k / 10): 20 of them count as one, with exp(-2 k) 1.3.
@@ -65,8 +61,8 @@ def test_a_gain_in_every_block_is_shown_whatever_their_sizes_but_a_slow_error_is
     before = slow + size * STUDY["errors"](rng, 1, 800, 20)[0]
     after = 0.1 * slow + 0.002 * rng.standard_normal(800)
     memory = max(correlation_time(e, [800], 0)[0] for e in (before, after))
-    assert share_with_interval(before**2, after**2, whole(800))[1] <= 0
-    assert (share_with_interval(before**2, after**2, whole(800), memory)[1] > 0.5) == shown
+    assert share_with_interval(before**2, after**2, np.array([800]))[1] <= 0
+    assert (share_with_interval(before**2, after**2, np.array([800]), memory)[1] > 0.5) == shown
 
 
 def test_of_few_experiments_no_block_is_shorter_than_asked_but_where_two_are_wanted():
@@ -79,7 +75,7 @@ def test_the_order_of_experiments_and_the_unit_of_the_output_do_not_matter():
     rng = np.random.default_rng(2)
     before, after = (STUDY["errors"](rng, 5, 200, 10) ** 2 for _ in range(2))  # [5, 200]
     intervals = [
-        share_with_interval(unit * before[order].ravel(), unit * after[order].ravel(), whole(*[200] * 5))
+        share_with_interval(unit * before[order].ravel(), unit * after[order].ravel(), np.full(5, 200))
         for order, unit in (([0, 1, 2, 3, 4], 1.0), ([3, 0, 4, 2, 1], 1e-6))
     ]
     assert intervals[0] == pytest.approx(intervals[1], rel=1e-9)
@@ -88,9 +84,8 @@ def test_the_order_of_experiments_and_the_unit_of_the_output_do_not_matter():
 @pytest.mark.parametrize(("experiments", "samples"), [(1, 1), (1, 2), (1, 5), (2, 1), (2, 5), (15, 2)])
 def test_a_few_samples_make_the_interval_wide_and_not_wrong(experiments, samples):
     rng = np.random.default_rng(3)
-    experiment = whole(*[samples] * experiments)
-    losses = [(white(rng, len(experiment)), white(rng, len(experiment))) for _ in range(300)]
-    above = [share_with_interval(*pair, experiment)[1] > 0 for pair in losses]
+    losses = [[white(rng, experiments * samples) for _ in range(2)] for _ in range(300)]
+    above = [share_with_interval(*pair, np.full(experiments, samples))[1] > 0 for pair in losses]
     assert np.mean(above) < 0.1  # 2.5 % is promised; two samples alone give 5 % in the long run
 
 
@@ -101,7 +96,7 @@ def test_errors_that_sit_in_two_of_ten_experiments_are_seen_twice():
     above = []
     for _ in range(300):
         before, after = ((sizes * STUDY["errors"](rng, 10, 60, 20)).ravel() ** 2 for _ in range(2))
-        above.append(share_with_interval(before, after, whole(*[60] * 10))[1] > 0)
+        above.append(share_with_interval(before, after, np.full(10, 60))[1] > 0)
     assert np.mean(above) < 0.08
 
 
@@ -109,7 +104,7 @@ def test_a_gain_that_one_burst_of_many_samples_brings_is_not_believed():
     rng = np.random.default_rng(4)
     before, after = white(rng, 4000), white(rng, 4000)
     before[1000:1060] += 40.0  # as much as all the rest of one experiment and a half
-    share, low, _ = share_with_interval(before, after, whole(1000, 1000, 1000, 1000))
+    share, low, _ = share_with_interval(before, after, np.full(4, 1000))
     assert share > 0.15
     assert low < 0
 
@@ -117,19 +112,19 @@ def test_a_gain_that_one_burst_of_many_samples_brings_is_not_believed():
 def test_a_gain_in_every_part_of_the_record_is_believed():
     rng = np.random.default_rng(5)
     noise = white(rng, 600)
-    assert share_with_interval(1.5 * noise, noise, whole(600))[1] > 0.1
+    assert share_with_interval(1.5 * noise, noise, np.array([600]))[1] > 0.1
 
 
 def test_where_every_block_gains_much_the_interval_lies_above_zero_though_one_of_them_holds_what_is_left():
     noise = white(np.random.default_rng(8), 1200)
     left = np.full(1200, 0.002)
     left[1050:] = 0.15  # one block of eight, which gained least
-    assert share_with_interval(noise, left * noise, whole(300, 300, 300, 300))[1] > 0
+    assert share_with_interval(noise, left * noise, np.full(4, 300))[1] > 0
 
 
 def test_models_that_err_alike_gain_exactly_nothing():
     losses = white(np.random.default_rng(6), 300)
-    assert share_with_interval(losses, losses, whole(100, 200)) == (0.0, 0.0, 0.0)
+    assert share_with_interval(losses, losses, np.array([100, 200])) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("lengths", [(100,), (7, 100, 3), (1,), (1, 1)])

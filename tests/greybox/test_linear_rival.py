@@ -18,9 +18,9 @@ def joint():
 def test_a_joint_that_swings_is_a_matter_of_order_and_no_delay(joint):
     (one,) = identify(joint.training)
     assert one.linear is not None
-    assert one.linear.plant.order > one.selection.baseline.plant.order
+    assert one.linear.baseline.plant.order > one.selection.baseline.plant.order
     # The fitted model is the linear one.
-    assert one.plant.estimate.plant.order == one.linear.plant.order
+    assert one.plant.estimate.plant.order == one.linear.baseline.plant.order
     assert one.plant.estimate.plant.terms == ()
 
 
