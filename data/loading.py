@@ -14,6 +14,7 @@ from simgap.data.formats.one_record import Choices, dataset_of, record_of
 from simgap.data.formats.plant_table import with_known
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
+from simgap.data.named import is_registered, load_registered
 from simgap.data.simulated_columns import split_off
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
@@ -59,6 +60,7 @@ def load(
 ) -> Dataset:
     """Load a data set: a registered name, a folder with dataset.toml, a file of one record or a pandas DataFrame.
 
+    A name may carry parameters where its data set takes some, "gimbal-noise4-delay0.2".
     A file (CSV, .mat or .parquet) and a DataFrame are one record: `inputs` and `outputs` name its columns, with or
     without the unit that stands there. The sampling time is that of the time column or `dt` in seconds, and the record
     is split in time 60/20/20. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
@@ -121,9 +123,9 @@ def read_recordings(source: Any, channels: Channels, dt: float | None = None) ->
 
 def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Dataset | None:
     """Load a source that describes itself; None for a file and a DataFrame."""
-    if isinstance(source, str) and source in DATASETS:
+    if isinstance(source, str) and is_registered(source):
         _refuse_columns(choices, f"data set {source}")
-        return DATASETS[source]()
+        return load_registered(source)
     if not isinstance(source, str | os.PathLike):
         return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text

@@ -123,13 +123,15 @@ class Headed(Block):
 class Parallel(Block):
     """Blocks side by side, then fully connected layers with a skip connection.
 
-    z = [features of all blocks]; FC(hidden) - ReLU - FC(size of z), plus z.
+    z = [features of all blocks]; FC(hidden) - ReLU - FC(size of z), plus z. `dropout` acts on z, `last_dropout` behind.
     """
 
-    def __init__(self, blocks: Sequence[Block], features: int, hidden: int, dropout: float = 0.0) -> None:
+    def __init__(
+        self, blocks: Sequence[Block], features: int, hidden: int, dropout: float = 0.0, last_dropout: float = 0.0
+    ) -> None:
         super().__init__()
         self.blocks: Any = nn.ModuleList(blocks)
-        self.dropout = nn.Dropout(dropout)
+        self.dropout, self.last_dropout = nn.Dropout(dropout), nn.Dropout(last_dropout)
         self.narrow, self.wide = full(features, hidden), full(hidden, features)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
@@ -142,4 +144,4 @@ class Parallel(Block):
 
     def _joined(self, z: Tensor) -> Tensor:
         z = self.dropout(z)
-        return z + self.wide(torch.relu(self.narrow(z)))
+        return self.last_dropout(z + self.wide(torch.relu(self.narrow(z))))

@@ -94,11 +94,12 @@ class Network(ABC):
             torch.manual_seed(seed)
             history = train(net, examples, held_out, self.recipe, seed, self.device, checkpoint, tell)
             scores = figures(net, examples), figures(net, held_out)
+            reach = {"reach": windows.reach(net, held_out)} if isinstance(held_out, windows.Windows) else {}
         self.trained = net
         self.fitted = {
             "epochs": len(history.valid), "best_epoch": history.best, "train": scores[0], "valid": scores[1],
             "train_loss": history.train, "valid_loss": history.valid,
-            "seconds_per_epoch": float(np.median(history.seconds)), "device": self.device,
+            "seconds_per_epoch": float(np.median(history.seconds)), "device": self.device, **reach,
         }  # fmt: skip
         if checkpoint is not None:
             checkpoints.remove(checkpoint)

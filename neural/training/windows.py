@@ -14,6 +14,8 @@ from simgap.neural.training.examples import Examples
 from simgap.neural.training.scaling import Scaling, features
 from simgap.records import Experiment, UnusableInput
 
+SOME = 256  # windows whose slopes are computed
+
 
 class Windows(Examples):
     """All windows of some experiments: x(k-W) .. x(k-1) with y(k), for every k that has W samples before it.
@@ -66,6 +68,18 @@ class Windows(Examples):
     def answer(self, net: Block, x: Float[Tensor, "B W F"]) -> Float[Tensor, "B ny"]:
         """Compute the network's outputs for a batch."""
         return net.last(x)
+
+
+def reach(net: Block, windows: Windows) -> float:
+    """Compute how much of an output's slope belongs to the older half of its window: 0 where gradients vanish.
+
+        sum_{k < W/2} |dy/dx_k| / sum_k |dy/dx_k|, over some windows, spread evenly (Bengio, Simard and Frasconi 1994)
+    """
+    chosen = torch.linspace(0, len(windows) - 1, min(len(windows), SOME), dtype=torch.double).round().long()
+    x = windows.batch(chosen)[0].clone().requires_grad_()
+    slopes = [torch.autograd.grad(y.sum(), x, retain_graph=True)[0] for y in net.last(x).unbind(1)]
+    sizes = torch.stack(slopes).abs().sum(dim=(0, 1, 3))  # [W]
+    return float(sizes[: windows.window // 2].sum() / sizes.sum().clamp(min=1e-30))
 
 
 def simulate(

@@ -11,7 +11,7 @@ from numpy.random import default_rng
 from simgap.data.simulated.gimbal.inputs import INPUTS
 from simgap.data.simulated.gimbal.motion import DT, simulate_gimbal
 from simgap.data.simulated.gimbal.parameters import Gimbal
-from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet, UnusableInput
 from simgap.registry import DATASETS
 
 __all__ = ["Gimbal", "gimbal", "gimbal_dataset", "simulate_gimbal"]
@@ -22,6 +22,8 @@ CHANNELS = Channels(
 )
 
 DEFAULT = Gimbal()
+N_TRAIN = 151  # experiments, as many as the paper has
+MOST_TRAIN = 5000
 
 # The first session is the longest and mostly random; the authors then held two more, with the joystick above
 # all, because the data lacked smooth motion (paper, 2.6). Kinds of input follow each other in this order.
@@ -43,7 +45,15 @@ class Planned(NamedTuple):
 
 
 @DATASETS.register("gimbal")
-def gimbal() -> Dataset:
+def gimbal(
+    data: float = 1.0,
+    noise: float = 1.0,
+    friction: float = 1.0,
+    drift: float = 1.0,
+    stiffness: float = 1.0,
+    delay: float = 0.0,
+    n_init: int = 40,
+) -> Dataset:
     """Yaw motion of a gimbal under a brushless motor: simulated recordings by the protocol of the paper.
 
     The authors' recordings are not public, as far as we could find, so none of these numbers was measured on
@@ -54,9 +64,25 @@ def gimbal() -> Dataset:
     readings that differs from experiment to experiment. n_init is 40 samples, the window of the paper's
     networks, so that every model may fill one such window before it is on its own.
 
+    Parameters may stand behind the name, "gimbal-data0.25-noise4": how many times the usual training experiments, noise
+    of both readings, Coulomb friction, drift of both readings and stiffness of the cable it has; the delay of the
+    input in s; n_init. What is not changed stays the same experiment. Raises UnusableInput.
+
     Reference: "Recurrent and Convolutional approaches for System Identification", section 2.
     """
-    return gimbal_dataset()
+    n_train = round(N_TRAIN * data)
+    if not 1 <= n_train <= MOST_TRAIN:
+        raise UnusableInput(f"gimbal: data={data:g} makes {n_train} training experiments; 1 to {MOST_TRAIN} can be made")
+    usual = DEFAULT
+    parameters = replace(
+        usual,
+        noise=(noise * usual.noise[0], noise * usual.noise[1]),
+        drift=(drift * usual.drift[0], drift * usual.drift[1]),
+        coulomb=friction * usual.coulomb,
+        cable_stiffness=stiffness * usual.cable_stiffness,
+        input_delay=delay,
+    )
+    return gimbal_dataset(parameters, n_train=n_train, n_init=n_init)
 
 
 @DATASETS.register("gimbal_short")
@@ -71,7 +97,7 @@ def gimbal_short() -> Dataset:
 def gimbal_dataset(
     parameters: Gimbal = DEFAULT,
     seed: int = 0,
-    n_train: int = 151,
+    n_train: int = N_TRAIN,
     n_valid: int = 15,
     n_test: int = 15,
     seconds: tuple[float, float, float] = (20.0, 40.0, 40.0),

@@ -1,0 +1,51 @@
+"""Registered data sets by name, with parameters behind it where one takes them: "gimbal-noise4-delay0.2"."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from simgap.records import Dataset, UnusableInput
+from simgap.registry import DATASETS
+
+PARAMETER = re.compile(r"([a-z_]+)(\d+(?:\.\d+)?)")
+
+
+def is_registered(text: str) -> bool:
+    """Tell whether a text is the name of a registered data set, with or without parameters.
+
+    A file or folder whose name looks like one with parameters is what it is.
+    """
+    if text in DATASETS:
+        return True
+    name, *pieces = text.split("-")
+    return name in DATASETS and all(map(PARAMETER.fullmatch, pieces)) and not Path(text).exists()
+
+
+def load_registered(text: str) -> Dataset:
+    """Make a registered data set; its name holds the parameters that are not the usual ones. Raises UnusableInput."""
+    if text in DATASETS:
+        return DATASETS[text]()
+    name, *pieces = text.split("-")
+    make = DATASETS[name]
+    usual = {key: parameter.default for key, parameter in inspect.signature(make).parameters.items()}
+    given = _numbers(name, pieces, usual)
+    changed = [f"{key}{given[key]:.15g}" for key in usual if given.get(key, usual[key]) != usual[key]]
+    return replace(make(**given), name="-".join([name, *changed]))
+
+
+def _numbers(name: str, pieces: Sequence[str], usual: Mapping[str, float]) -> dict[str, float]:
+    numbers: dict[str, float] = {}
+    for piece in pieces:
+        key, number = PARAMETER.findall(piece)[0]
+        if key not in usual or key in numbers:
+            takes = f"it takes {', '.join(usual)}, each once" if usual else "it takes none"
+            raise UnusableInput(f"data set {name} has no parameter {piece!r}; {takes}")
+        value = float(number)
+        if isinstance(usual[key], int) and value != round(value):
+            raise UnusableInput(f"data set {name}: {key} is a whole number, such as {usual[key]}")
+        numbers[key] = int(value) if isinstance(usual[key], int) else value
+    return numbers
