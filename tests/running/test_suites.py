@@ -31,10 +31,10 @@ def test_smoke_is_every_model_but_on_little_data():
     assert suite.datasets == ("gimbal_short",)
 
 
-def test_the_paper_has_twenty_networks_and_four_classical_models():
+def test_the_paper_has_twenty_networks_and_four_classical_models_and_three_that_it_only_speaks_of():
     entries = load_suite("paper").models
     delta = [entry for entry in entries if entry.label.endswith(" delta")]
-    assert (len(entries), len(delta)) == (24, 12)
+    assert (len(entries), len(delta)) == (27, 12)
     assert all(entry.name == "delta" for entry in delta)
 
 
@@ -144,5 +144,5 @@ def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones():
-    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are full, paper, smoke"):
+    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are crossover, full, paper, smoke"):
         load_suite("nosuch")
