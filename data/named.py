@@ -30,11 +30,10 @@ def load_registered(text: str) -> Dataset:
     if text in DATASETS:
         return DATASETS[text]()
     name, *pieces = text.split("-")
-    make = DATASETS[name]
-    usual = {key: parameter.default for key, parameter in inspect.signature(make).parameters.items()}
+    usual = usual_parameters(name)
     given = _numbers(name, pieces, usual)
     changed = [f"{key}{given[key]:.15g}" for key in usual if given.get(key, usual[key]) != usual[key]]
-    return replace(make(**given), name="-".join([name, *changed]))
+    return replace(DATASETS[name](**given), name="-".join([name, *changed]))
 
 
 def _numbers(name: str, pieces: Sequence[str], usual: Mapping[str, float]) -> dict[str, float]:
@@ -49,3 +48,17 @@ def _numbers(name: str, pieces: Sequence[str], usual: Mapping[str, float]) -> di
             raise UnusableInput(f"data set {name}: {key} is a whole number, such as {usual[key]}")
         numbers[key] = int(value) if isinstance(usual[key], int) else value
     return numbers
+
+
+def parameters_of(text: str) -> tuple[str, dict[str, float]]:
+    """Split a name such as "gimbal-noise4" into the data set's own and its parameters; of any other there are none."""
+    name, *pieces = text.split("-")
+    if text in DATASETS or name not in DATASETS or not all(map(PARAMETER.fullmatch, pieces)):
+        return text, {}
+    return name, {key: float(value) for key, value in (PARAMETER.findall(piece)[0] for piece in pieces)}
+
+
+def usual_parameters(name: str) -> dict[str, float]:
+    """List the parameters that a registered data set takes, with what they usually are."""
+    parameters = inspect.signature(DATASETS[name]).parameters
+    return {key: one.default for key, one in parameters.items() if isinstance(one.default, int | float)}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simgap.records import Dataset
-from simgap.reports import confusion, recovery
+from simgap.reports import confusion, crossover, recovery
 from simgap.reports.diagnosis.traces import axis_range, thin
 from simgap.reports.latex import to_latex
 from simgap.reports.leaderboard import all_tables, read_suites
@@ -31,7 +31,7 @@ COLOURS = ("#1f83c6", "#e0662b", "#2f9e63", "#a25fc4", "#c99700", "#d6336c")
 
 def write_figures(folder: str | Path = "results", out: str | Path | None = None, public: bool = False) -> list[Path]:
     """Write every table as LaTeX (booktabs), and as SVG and PDF: errors against the horizon, the best models' free
-    runs where artefacts and data are at hand, and the confusion matrix of a recovery study.
+    runs where artefacts and data are at hand, the curves of a crossover study, the confusion matrix of a recovery study.
 
     `out` is `<folder>/figures` by default; `public` leaves out signals of data sets without a licence. The same results
     give the same files. Returns the files. Raises UnusableInput when there are no results.
@@ -49,6 +49,8 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
             written.append(out / f"{name}.tex")
             written[-1].write_text(to_latex(tables[title]), encoding="utf-8")
     for suite, standings in collection.standings.items():
+        if crossover.of_crossover(collection.suites[suite]):
+            written += _saved(crossover.drawn(collection.suites[suite], COLOURS), out / f"{file_names([suite])[suite]}")
         for dataset in collection.datasets:
             here = sorted((s for s in standings if s.dataset == dataset), key=_fit, reverse=True)
             name = file_names([f"{suite}-{dataset}"])[f"{suite}-{dataset}"]

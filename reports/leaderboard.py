@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,11 +10,13 @@ import pandas as pd
 
 from simgap.records import Result, UnusableInput
 from simgap.reports import recovery
+from simgap.reports.crossover import crossover_tables, of_crossover
 from simgap.reports.modes import modes_table
 from simgap.reports.paper.claims import claims, claims_table
 from simgap.reports.paper.tables import of_paper, paper_tables
 from simgap.reports.published import published_markdown
 from simgap.reports.rendering import escape, to_markdown
+from simgap.reports.skill import skill_table
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
@@ -60,25 +63,33 @@ def report(folder: str | Path = "results") -> Report:
 
 def all_tables(folder: Path, suites: dict[str, list[Result]]) -> dict[str, list[Table]]:
     """Make the tables of each suite and, under the name of its folder, of the recovery study."""
-    tables = {suite: tables_of(results) for suite, results in suites.items()}
+    crossover = [row for results in suites.values() if of_crossover(results) for row in results]
+    tables = {suite: tables_of(results, crossover) for suite, results in suites.items()}
     study = recovery.tables(folder)
     return tables | ({recovery.FOLDER: study} if study else {})
 
 
-def tables_of(results: list[Result]) -> list[Table]:
-    """Make the overview and each data set's table, before them the paper's tables and claims for its suite."""
-    modes = modes_table(results)
-    return [*_of_paper(results), overview(results), *([modes] if modes else []), *_of_datasets(results)]
+def tables_of(results: list[Result], crossover: Sequence[Result] = ()) -> list[Table]:
+    """Make the overview and each data set's table, before them the paper's tables and claims for its suite.
+
+    The rows of the crossover study have tables of their own, and decide some of those claims.
+    """
+    if of_crossover(results):
+        return crossover_tables(results)
+    of_all = [table for table in (skill_table(results), modes_table(results)) if table]
+    return [*_of_paper(results, crossover), overview(results), *of_all, *_of_datasets(results)]
 
 
 def brief(results: list[Result]) -> list[Table]:
     """Make the tables shown after a run: the figures of a few data sets in their units, of many the overview."""
+    if of_crossover(results):
+        return crossover_tables(results)[:1]
     details = _of_datasets(results)
     return [*_of_paper(results), *(details if len(details) <= FEW else [overview(results)])]
 
 
-def _of_paper(results: list[Result]) -> list[Table]:
-    return [*paper_tables(results), claims_table(claims(results))] if of_paper(results) else []
+def _of_paper(results: list[Result], crossover: Sequence[Result] = ()) -> list[Table]:
+    return [*paper_tables(results), claims_table(claims(results, crossover))] if of_paper(results) else []
 
 
 def _of_datasets(results: list[Result]) -> list[Table]:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from simgap.records import Result
 from simgap.reports.paper.claim_rules import RULES, Figures, Rule, Undecided
-from simgap.reports.paper.tables import PRINTED, Values, rows_by_label, values_by_seed
+from simgap.reports.paper.tables import LABELS, PRINTED, SPOKEN_OF, Values, rows_by_label, values_by_condition, values_by_seed
 from simgap.reports.tables import Cell, Table
 
 Judgement = Literal["holds", "does not hold", "cannot be told"]
@@ -30,9 +30,13 @@ class Claim:
     rule: str
 
 
-def claims(results: Sequence[Result]) -> list[Claim]:
-    """Decide all claims: one holds, or does not, if the medians over the seeds say so and so do most of the seeds."""
-    by_label = {label: values_by_seed(rows) for label, rows in rows_by_label(results).items()}
+def claims(results: Sequence[Result], crossover: Sequence[Result] = ()) -> list[Claim]:
+    """Decide all claims: one holds, or does not, if the medians over the seeds say so and so do most of the seeds.
+
+    Some are about conditions that only rows of the suite `crossover` have.
+    """
+    rows_of = rows_by_label(results, (*LABELS, *SPOKEN_OF))
+    by_label = {label: values_by_seed(rows) for label, rows in rows_of.items()} | values_by_condition(crossover)
     seeds = sorted({seed for found in by_label.values() for seed in found})
     medians = Figures({label: _medians(list(found.values())) for label, found in by_label.items()})
     single = [Figures({label: found.get(seed, {}) for label, found in by_label.items()}) for seed in seeds]

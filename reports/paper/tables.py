@@ -47,6 +47,7 @@ def _read() -> tuple[dict[str, str], list[Printed]]:
 
 NAMES, PRINTED = _read()
 LABELS = tuple(dict.fromkeys(label for table in PRINTED for label in table.rows))
+SPOKEN_OF = ("small", "small-reg", "GRU-LSTM-CONV1D-last")  # labels of networks that the paper has claims about only
 
 
 def paper_tables(results: Sequence[Result]) -> list[Table]:
@@ -64,15 +65,29 @@ def of_paper(results: Sequence[Result]) -> bool:
     return any(row.task == "differences" for rows in rows_by_label(results).values() for row in rows)
 
 
-def rows_by_label(results: Sequence[Result]) -> dict[str, tuple[Result, ...]]:
+def rows_by_label(results: Sequence[Result], labels: Sequence[str] = LABELS) -> dict[str, tuple[Result, ...]]:
     """Sort rows by the paper's models; of several sets of parameters, the one that comes last counts."""
-    return {standing.rows[0].model: standing.rows for standing in standings(_ours_of(results))}
+    return {standing.rows[0].model: standing.rows for standing in standings(_ours_of(results, labels))}
 
 
 def values_by_seed(rows: Sequence[Result]) -> dict[int, Values]:
     """Collect the figures of one model for each seed, by the paper's columns; columns without a figure are left out."""
     seeds = sorted({row.seed for row in rows})
     return {seed: _values([row for row in rows if row.seed == seed]) for seed in seeds}
+
+
+def values_by_condition(results: Sequence[Result]) -> dict[str, dict[int, Values]]:
+    """Collect the figures of models of the crossover study, by label and seed; a column names its data set."""
+    found: dict[str, dict[int, Values]] = {}
+    for standing in standings(results):
+        for seed in {row.seed for row in standing.rows}:
+            rows = [row for row in standing.rows if row.seed == seed]
+            about, values = rows[0].fitted, found.setdefault(standing.rows[0].model, {}).setdefault(seed, {})
+            here = {f"MSE of {output}": pooled_mse(rows, output) for output in OUTPUTS}
+            learned = {part: about[part] for part in ("train", "valid") if isinstance(about.get(part), dict)}
+            here |= {f"MSE {part}": figures.get("mse") for part, figures in learned.items()}
+            values |= {f"{column} on {standing.dataset}": mse for column, mse in here.items() if mse is not None}
+    return found
 
 
 def pooled_mse(rows: Sequence[Result], output: str) -> float | None:
@@ -89,8 +104,8 @@ def rises(losses: Sequence[float]) -> float:
     return sum(ups) / len(ups) / min(losses)
 
 
-def _ours_of(results: Sequence[Result]) -> list[Result]:
-    return [row for row in results if row.dataset == DATASET and row.model in LABELS]
+def _ours_of(results: Sequence[Result], labels: Sequence[str] = LABELS) -> list[Result]:
+    return [row for row in results if row.dataset == DATASET and row.model in labels]
 
 
 def _values(rows: Sequence[Result]) -> Values:
@@ -104,6 +119,7 @@ def _values(rows: Sequence[Result]) -> Values:
         if isinstance(learned, dict):
             found |= {f"{name} {part}": learned.get(name.lower().replace("²", "2")) for name in ("MSE", "MAE", "R²")}
     found |= {"epochs": about.get("epochs"), "best epoch": about.get("best_epoch"), "parameters": rows[0].n_params}
+    found["reach"] = about.get("reach")
     losses = about.get("valid_loss") or []
     found["rises"] = rises(losses) if len(losses) > 2 and min(losses) > 0 else None
     return {column: float(value) for column, value in found.items() if isinstance(value, int | float)}

@@ -10,6 +10,7 @@ from simgap.data import describe
 from simgap.records import UnusableInput
 from simgap.registry import MODELS
 from simgap.reports import recovery
+from simgap.reports.crossover import crossover_tables, of_crossover
 from simgap.reports.leaderboard import ABOUT_SUITE, HOW_TO_READ, read_suites
 from simgap.reports.modes import WINDOWED, modes_table
 from simgap.reports.paper.claims import claims, claims_table
@@ -18,11 +19,13 @@ from simgap.reports.pooling import Standing
 from simgap.reports.published import WARNING, published_tables
 from simgap.reports.site import diagnoses, runs, signals
 from simgap.reports.site.collection import Collection, Run, group_of
+from simgap.reports.site.crossover_charts import crossover_charts
 from simgap.reports.site.diagnoses import MARK
 from simgap.reports.site.fit_charts import horizon_charts, training_chart
 from simgap.reports.site.model_table import model_table
 from simgap.reports.site.names import file_names, script
 from simgap.reports.site.pages import Writer, unique
+from simgap.reports.skill import skill_table
 from simgap.reports.tables import dataset_table, overview
 
 NO_RUNS = (
@@ -72,6 +75,7 @@ class _Site:
         self.found = found
         self.cases = recovery.read(collection.folder)
         self.paper = [rows for rows in collection.suites.values() if of_paper(rows)]
+        self.crossover = {name: rows for name, rows in collection.suites.items() if of_crossover(rows)}
         self.dataset_keys = file_names(collection.datasets)
         self.model_keys = file_names(collection.models)
         self.suite_keys = file_names(collection.suites)
@@ -85,6 +89,7 @@ class _Site:
         menu = [("index.html", "Leaderboard")]
         menu += [("datasets.html", "Data sets"), ("models.html", "Models")] if self.collection.suites else []
         menu += [("paper.html", "The paper")] if self.paper else []
+        menu += [("crossover.html", "Who wins when")] if self.crossover else []
         menu += [("recovery.html", "Recovery study")] if self.cases else []
         menu += [("diagnoses.html", "Diagnoses")] if self.found else []
         return [*menu, ("published.html", "Published by others")]
@@ -109,10 +114,12 @@ class _Site:
         models, datasets = self._links("")
         suites = []
         for name, rows in self.collection.suites.items():
+            if name in self.crossover and len(self.collection.suites) > 1:
+                continue  # has a page of its own
             table = overview(rows)
             shown = [row[0].text for row in table.rows]
             suites.append({
-                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "modes": modes_table(rows),
+                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "skill": skill_table(rows), "modes": modes_table(rows),
                 "groups": self.groups, "group_names": sorted(unique(self.groups[label] for label in shown)),
                 "paper": of_paper(rows),
             })  # fmt: skip
@@ -206,9 +213,19 @@ class _Site:
             "tables.html", "published.html", heading="Published by others", about=WARNING, tables=published_tables()
         )
         if self.paper:
-            tables = [table for rows in self.paper for table in (*paper_tables(rows), claims_table(claims(rows)))]
+            conditions = [row for rows in self.crossover.values() for row in rows]
+            tables = [
+                table for rows in self.paper for table in (*paper_tables(rows), claims_table(claims(rows, conditions)))
+            ]
             about = "Tables 1 to 4 and the claims of the paper, its figures beside those of the suite paper."
             self.writer.page("tables.html", "paper.html", heading="The paper", about=about, tables=tables)
+        if self.crossover:
+            suites = []
+            for name, rows in self.crossover.items():
+                key = f"crossover/{self.suite_keys[name]}"
+                self._script(key, {"charts": crossover_charts(rows)})
+                suites.append({"name": name, "key": key, "tables": crossover_tables(rows)})
+            self.writer.page("crossover.html", "crossover.html", suites=suites)
         if self.cases:
             self.writer.page("recovery.html", "recovery.html", **self.cases)
         diagnoses_pages(self.writer, self.found)

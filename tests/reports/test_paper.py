@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from simgap.reports.leaderboard import brief, report, tables_of
-from simgap.reports.paper.tables import LABELS, NAMES, PRINTED, of_paper, paper_tables, pooled_mse, rises
+from simgap.reports.paper.tables import LABELS, NAMES, PRINTED, SPOKEN_OF, of_paper, paper_tables, pooled_mse, rises
 from simgap.reports.rendering import to_markdown, to_rich
 from simgap.results import store
 from simgap.running.suites import load_suite
@@ -55,7 +55,7 @@ def test_the_printed_figures_are_those_of_the_paper(table, label, heading, figur
 
 
 def test_the_labels_are_those_of_the_suite():
-    assert set(LABELS) == {entry.label for entry in load_suite("paper").models}
+    assert {*LABELS, *SPOKEN_OF} == {entry.label for entry in load_suite("paper").models}
     assert {label.removesuffix(" delta") for label in LABELS} == set(NAMES)
 
 

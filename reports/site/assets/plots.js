@@ -52,7 +52,7 @@ const simgap = (() => {
       height: about.square ? 340 : 290, title: { text: about.title, x: 0, xref: "paper", font: { size: 13 } },
       xaxis: axis(about.x, {
         type: log.includes("x") ? "log" : "linear", nticks: 6, ...(about.square ? { constrain: "domain" } : {}),
-        ...(about.ticks ? { tickvals: about.ticks } : log.includes("x") ? { dtick: 1 } : {}),
+        ...(about.ticks ? { tickvals: about.ticks, ticktext: about.tick_words ?? about.ticks } : log.includes("x") ? { dtick: 1 } : {}),
       }),
       yaxis: axis(about.y, {
         type: log.includes("y") ? "log" : "linear", nticks: 6, ...(log.includes("y") ? { exponentformat: "power" } : {}),
