@@ -58,16 +58,17 @@ class KernelNarx:
 class Regression:
     """Least squares on the kernel features of chosen centres, for any weight of the prior.
 
-    The features are k(r, C) L^-T with k(C, C) = L L', so that their prior is white: the posterior mean of a Gaussian
-    process on a subset of regressors (Rasmussen and Williams 2006, section 8.3.1).
+    The features Phi are k(r, C) L^-T with k(C, C) = L L', so that their prior is white: the posterior mean of a Gaussian
+    process on a subset of regressors (Rasmussen and Williams 2006, section 8.3.1). From the singular values of Phi, by
+    QR, because rounding in Phi' Phi is as large as a small ridge (Foster et al., J. Machine Learning Research 10, 2009).
     """
 
     centres: Float[np.ndarray, "m n"]
     root: Float[np.ndarray, "m m"]
     gamma: float
-    vectors: Float[np.ndarray, "p p"]
-    values: Float[np.ndarray, " p"]
-    right: Float[np.ndarray, "p ny"]
+    vectors: Float[np.ndarray, "p s"]
+    values: Float[np.ndarray, " s"]
+    right: Float[np.ndarray, "s ny"]
 
     @classmethod
     def of(
@@ -77,16 +78,18 @@ class Regression:
         candidates = r[np.linspace(0, len(r) - 1, min(pool, len(r))).astype(int)]
         chosen, root = pivoted_cholesky(candidates, gamma, most)
         centres = candidates[chosen]
-        products, right = np.zeros((1, 1)), np.zeros((1, 1))
+        triangle = np.zeros((0, r.shape[1] + 1 + len(centres) + y.shape[1]))
         for at in range(0, len(r), CHUNK):
             phi = _features(r[at : at + CHUNK], centres, root, gamma)
-            products, right = products + phi.T @ phi, right + phi.T @ y[at : at + CHUNK]
-        values, vectors = np.linalg.eigh(products)
-        return cls(centres, root, gamma, vectors, np.maximum(values, 0.0), vectors.T @ right)
+            both = np.concatenate((phi, y[at : at + CHUNK]), axis=1)
+            triangle = np.linalg.qr(np.concatenate((triangle, both)), mode="r")
+        count = triangle.shape[1] - y.shape[1]
+        left, values, vectors = np.linalg.svd(triangle[:, :count], full_matrices=False)
+        return cls(centres, root, gamma, vectors.T, values, left.T @ triangle[:, count:])
 
     def solution(self, ridge: float) -> tuple[Float[np.ndarray, "n1 ny"], Float[np.ndarray, "m ny"]]:
         """Compute the linear part and the weights of the kernels; ridge is the noise variance over the prior's."""
-        beta = self.vectors @ (self.right / (self.values + ridge)[:, None])
+        beta = self.vectors @ (self.right * (self.values / (self.values**2 + ridge))[:, None])
         first = self.centres.shape[1] + 1
         weights = solve_triangular(self.root.T, beta[first:])
         return np.ascontiguousarray(LINEAR * beta[:first]), np.ascontiguousarray(weights)
