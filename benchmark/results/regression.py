@@ -10,16 +10,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from scipy.stats import t as student
+
 from simgap.records import Result, UnusableInput
 from simgap.results import store
 
 Change = Literal["same", "better", "worse", "missing", "new"]
 
-# Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it by;
+# Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it;
 # and of one whose numbers depend on the seed, where three times the spread of its seeds counts if that is more.
 COMPUTED = 1e-5
 STOCHASTIC = 0.05
 SIGMAS = 3.0
+ALARM = 0.001  # chance of one where nothing but rounding changed, of a mean over seeds
 # Share of the spread of what was measured below which an RMSE is rounding.
 ROUNDING = 1e-9
 ON_AVERAGE = "on average"
@@ -64,8 +67,8 @@ def check(new: str | Path, reference: str | Path = Path("reports") / "results") 
     """Compare the results in a folder with those of a reference, suite by suite.
 
     An RMSE is worse when it exceeds the reference by more than 1e-5 of it or, for a model that declares itself
-    stochastic, by more than max(3 sigma of the reference's seeds, 5 %); so is their geometric mean per model and data
-    set. A row of the reference is missing when the new results lack it although they have its seed. Raises
+    stochastic, by more than max(3 sigma of the reference's seeds, 5 %). Their geometric mean per model and data set is
+    worse by more than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when the new results lack it although they have its seed. Raises
     UnusableInput.
     """
     new, reference = Path(new), Path(reference)
@@ -131,14 +134,19 @@ class _Group:
                     yield self._judged(figure, row.seed, value, figures[name][0], limit, now)
 
     def on_average(self) -> Iterator[Comparison]:
-        """The geometric mean of all figures of both, which spreads less than each of them."""
+        """The geometric mean of all figures of both, which spreads less than each of them.
+
+        The same seeds give the same figures but for rounding, which a long training may blow up: how much their changes
+        differ tells (Student's paired t). A loss that all seeds share has no such spread.
+        """
         before, after = _means(self.before), _means(self.after)
         shared = sorted(before.keys() & after.keys())
         if not shared or not self._spread:
             return
         was, is_now = (math.exp(statistics.fmean(of[seed] for seed in shared)) for of in (before, after))
-        sigma = statistics.stdev(before.values()) / math.sqrt(len(shared)) if len(before) > 1 else 0.0
-        limit = was * math.exp(max(SIGMAS * sigma, math.log1p(STOCHASTIC)))
+        changes = [after[seed] - before[seed] for seed in shared]
+        reach = student.ppf(1 - ALARM, len(shared) - 1) * statistics.stdev(changes) if len(shared) > 1 else 0.0
+        limit = was * math.exp(max(reach / math.sqrt(len(shared)), math.log1p(STOCHASTIC)))
         yield self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 
     def _allowed(self, value: float, sigma: float, scale: float) -> float:
