@@ -20,7 +20,7 @@ INSTALLED := $(VENV)/installed-$(VERSION)
 .PHONY: help dev peers test test-slow benchmark speed lint lock clean
 
 help:
-	@echo "make benchmark   all models on all data sets at hand, as tables in the terminal and in results/"
+	@echo "make benchmark   quick models on all data sets at hand, as tables in the terminal and in results/"
 	@echo "make test        the tests; make test-slow for those that take minutes, after make peers with SIPPY"
 	@echo "make lint        format, style and types; make dev sets up .venv and stops"
 	@echo "make speed       times beside those of other tools, with make peers"
@@ -61,7 +61,7 @@ test-slow: $(INSTALLED)
 # the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.
 benchmark: $(INSTALLED)
 	@[ ! -d results ] || echo "Carrying on in results/: jobs whose data and model are unchanged are not run again."
-	@[ -t 1 ] || export COLUMNS=200; failed=0; $(BIN)/simgap run full --jobs $(JOBS) --out results || failed=$$?; \
+	@[ -t 1 ] || export COLUMNS=200; failed=0; $(BIN)/simgap run benchmark --jobs $(JOBS) --out results || failed=$$?; \
 	  [ $$failed -gt 1 ] || $(BIN)/simgap report results; exit $$failed
 
 # Without the conftest.py above it, whose checks of shapes would be timed along.

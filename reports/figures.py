@@ -31,7 +31,7 @@ COLOURS = ("#1f83c6", "#e0662b", "#2f9e63", "#a25fc4", "#c99700", "#d6336c")
 
 def write_figures(folder: str | Path = "results", out: str | Path | None = None, public: bool = False) -> list[Path]:
     """Write every table as LaTeX (booktabs), and as SVG and PDF: errors against the horizon, the best models' free
-    runs where artefacts and data are at hand, the curves of a crossover study, the confusion matrix of a recovery study.
+    runs where artefacts and data are at hand, the curves of a crossover and the confusion matrix of a recovery study.
 
     `out` is `<folder>/figures` by default; `public` leaves out signals of data sets without a licence. The same results
     give the same files. Returns the files. Raises UnusableInput when there are no results.

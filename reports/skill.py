@@ -59,7 +59,8 @@ def skill_table(results: Sequence[Result]) -> Table | None:
         "one. In brackets: 95 %, by bootstrap over data sets; few of them make it wide. Parameters: median; "
         "seconds of fitting: of all data sets together, one seed."
     ]
-    return Table("Skill over all data sets", ["model", "skill %", "win rate %", "data sets", "parameters", "fit s"], rows, notes)
+    columns = ["model", "skill %", "win rate %", "data sets", "parameters", "fit s"]
+    return Table("Skill over all data sets", columns, rows, notes)
 
 
 def _errors(of_model: Sequence[Standing]) -> dict[str, float]:

@@ -58,9 +58,10 @@ class KernelNarx:
 class Regression:
     """Least squares on the kernel features of chosen centres, for any weight of the prior.
 
-    The features Phi are k(r, C) L^-T with k(C, C) = L L', so that their prior is white: the posterior mean of a Gaussian
-    process on a subset of regressors (Rasmussen and Williams 2006, section 8.3.1). From the singular values of Phi, by
-    QR, because rounding in Phi' Phi is as large as a small ridge (Foster et al., J. Machine Learning Research 10, 2009).
+    The features Phi are k(r, C) L^-T with k(C, C) = L L', so that their prior is white: the posterior mean of a
+    Gaussian process on a subset of regressors (Rasmussen and Williams 2006, section 8.3.1). From the singular values of
+    Phi, by QR, because rounding in Phi' Phi is as large as a small ridge (Foster et al., J. Machine Learning Research
+    10, 2009).
     """
 
     centres: Float[np.ndarray, "m n"]

@@ -49,7 +49,8 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
     name = channels.outputs[baseline.outputs[0]].name
     effects = [term.effect.title for term in chosen.terms]
     helped = f" with {' and '.join(effects)}" if effects else ""
-    rival, plain = f"A linear model of order {one.linear.baseline.plant.order}", f"the plain one of order {baseline.plant.order}"
+    rival = f"A linear model of order {one.linear.baseline.plant.order}"
+    plain = f"the plain one of order {baseline.plant.order}"
     nothing = "so that no effect can be held responsible for what is wrong"
     if effects and one.linear.errs_more:
         return (

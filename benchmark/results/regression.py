@@ -68,8 +68,8 @@ def check(new: str | Path, reference: str | Path = Path("reports") / "results") 
 
     An RMSE is worse when it exceeds the reference by more than 1e-5 of it or, for a model that declares itself
     stochastic, by more than max(3 sigma of the reference's seeds, 5 %). Their geometric mean per model and data set is
-    worse by more than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when the new results lack it although they have its seed. Raises
-    UnusableInput.
+    worse by more than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when
+    the new results lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
     for folder in (new, reference):

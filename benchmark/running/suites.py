@@ -13,6 +13,9 @@ from simgap.registry import DATASETS, MODELS
 from simgap.tasks import TASKS, USUAL
 
 FOLDER = Path(__file__).parent / "suites"
+KEYS = (
+    "title", "datasets", "without", "models", "without_models", "groups", "tasks", "seeds", "timeout", "memory",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,7 @@ class _Reader:
     table: dict[str, Any]
 
     def suite(self) -> Suite:
-        known = ("title", "datasets", "without", "models", "groups", "tasks", "seeds", "timeout", "memory")
-        self._refuse_unknown(self.table, known)
+        self._refuse_unknown(self.table, KEYS)
         suite = Suite(
             name=self.path.stem,
             title=self._get("title", str, self.path.stem),
@@ -109,6 +111,10 @@ class _Reader:
     def _models(self) -> Iterable[Entry]:
         """The entries of the tables; one with the name of a model that `all` has brought takes its place."""
         given = self._get("models", (list, str), "all")
+        without = self._get("without_models", list, [""])
+        for name in without:
+            if name and name not in MODELS:
+                raise UnusableInput(f"{self.path}: without_models: there is no registered model {name!r}")
         tables = [{"name": "all"}] if given == "all" else given
         if isinstance(tables, str) or not all(isinstance(table, dict) for table in tables):
             raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
@@ -120,7 +126,7 @@ class _Reader:
             if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
                 raise UnusableInput(f"{self.path}: a model needs a name, a table params and a text as label")
             if entry[0] == "all":
-                usual = {name: Entry(name) for name in MODELS}
+                usual = {name: Entry(name) for name in MODELS if name not in without}
             else:
                 name = self._near(entry[0]) if ".py:" in entry[0] else entry[0]
                 chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table)))

@@ -73,7 +73,9 @@ class Windows(Examples):
 def reach(net: Block, windows: Windows) -> float:
     """Compute how much of an output's slope belongs to the older half of its window: 0 where gradients vanish.
 
-        sum_{k < W/2} |dy/dx_k| / sum_k |dy/dx_k|, over some windows, spread evenly (Bengio, Simard and Frasconi 1994)
+        sum_{k < W/2} |dy/dx_k| / sum_k |dy/dx_k|
+
+    over some windows, spread evenly (Bengio, Simard and Frasconi, IEEE Trans. Neural Networks 5, 1994).
     """
     chosen = torch.linspace(0, len(windows) - 1, min(len(windows), SOME), dtype=torch.double).round().long()
     x = windows.batch(chosen)[0].clone().requires_grad_()

@@ -194,8 +194,8 @@ def _tcn_validates(f: Figures) -> tuple[bool, str]:
 
 @_claim("with much more data, TCNs could be the best of all", "4.4")
 def _tcn_with_more(f: Figures) -> tuple[bool, str]:
-    """With four times the recordings a TCN has the lowest MSE of four networks on windows, by the geometric mean of both
-    outputs.
+    """With four times the recordings a TCN has the lowest MSE of four networks on windows, by the geometric mean of
+    both outputs.
     """
     scores = {k: _geometric([f(k, f"MSE of {o} on {MOST}") for o in OUTPUTS]) for k in ON_WINDOWS}
     usual = {k: _geometric([f(k, f"MSE of {o} on gimbal") for o in OUTPUTS]) for k in ON_WINDOWS}
@@ -235,13 +235,13 @@ def _few_parameters(f: Figures) -> tuple[bool, str]:
 @_claim("networks need much more data to avoid overfitting", "4.5")
 def _need_more(f: Figures) -> tuple[bool, str]:
     """With an eighth of the recordings the median network on windows has at least twice the ratio of validation to
-    training MSE that it has with four times as many, and ARX at most 1.25 times the MSE (geometric mean of both outputs).
+    training MSE that it has with four times as many, and ARX at most 1.25 times the MSE (geometric mean of both).
     """
     few, many = (median(_ratio(f(k, f"MSE valid on {d}"), f(k, f"MSE train on {d}")) for k in ON_WINDOWS)
                  for d in (FEWEST, MOST))  # fmt: skip
     arx = _geometric([_ratio(f("arx", f"MSE of {o} on {FEWEST}"), f("arx", f"MSE of {o} on {MOST}")) for o in OUTPUTS])
-    told = f"validation by training MSE {few:.3g} with an eighth, {many:.3g} with four times as many; ARX {arx:.3g} times"
-    return few >= FAR * many and arx <= ALIKE, told
+    told = f"validation by training MSE {few:.3g} with an eighth, {many:.3g} with four times as many"
+    return few >= FAR * many and arx <= ALIKE, f"{told}; ARX {arx:.3g} times"
 
 
 def _scores(f: Figures, model: str) -> list[float]:

@@ -9,7 +9,15 @@ from typing import Literal
 
 from simgap.records import Result
 from simgap.reports.paper.claim_rules import RULES, Figures, Rule, Undecided
-from simgap.reports.paper.tables import LABELS, PRINTED, SPOKEN_OF, Values, rows_by_label, values_by_condition, values_by_seed
+from simgap.reports.paper.tables import (
+    LABELS,
+    PRINTED,
+    SPOKEN_OF,
+    Values,
+    rows_by_label,
+    values_by_condition,
+    values_by_seed,
+)
 from simgap.reports.tables import Cell, Table
 
 Judgement = Literal["holds", "does not hold", "cannot be told"]

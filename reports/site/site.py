@@ -119,7 +119,8 @@ class _Site:
             table = overview(rows)
             shown = [row[0].text for row in table.rows]
             suites.append({
-                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "skill": skill_table(rows), "modes": modes_table(rows),
+                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "skill": skill_table(rows),
+                "modes": modes_table(rows),
                 "groups": self.groups, "group_names": sorted(unique(self.groups[label] for label in shown)),
                 "paper": of_paper(rows),
             })  # fmt: skip

@@ -56,7 +56,7 @@ def test_the_winner_is_the_one_whose_error_is_smaller_beyond_chance():
         "gimbal": "neither", "gimbal-noise0": "network", "gimbal-noise4": "arx", "gimbal-data0.5": "neither",
         "gimbal-friction2-drift0": "network",
     }  # fmt: skip
-    assert list(winners)[0] == "gimbal"
+    assert next(iter(winners)) == "gimbal"
     assert list(winners)[-1] == "gimbal-friction2-drift0"
 
 

@@ -1,7 +1,7 @@
 import pytest
 
-from simgap.records import UnusableInput
 from simgap.data.named import is_registered
+from simgap.records import UnusableInput
 from simgap.registry import DATASETS, MODELS
 from simgap.running.suites import Entry, load_suite, suite_names
 
@@ -36,6 +36,20 @@ def test_the_paper_has_twenty_networks_and_four_classical_models_and_three_that_
     delta = [entry for entry in entries if entry.label.endswith(" delta")]
     assert (len(entries), len(delta)) == (27, 12)
     assert all(entry.name == "delta" for entry in delta)
+
+
+def test_the_benchmark_is_everything_that_is_quick_and_any_model_of_somebodys_own(monkeypatch):
+    slow = set(MODELS) - {entry.name for entry in load_suite("benchmark").models}
+    assert {"wiener-hammerstein", "greybox-auto"} < slow < set(MODELS)
+    monkeypatch.setitem(MODELS._targets, "my_own", object())
+    assert "my_own" in {entry.name for entry in load_suite("benchmark").models}
+
+
+def test_models_that_are_left_out_must_be_known(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('without_models = ["nosuch"]')
+    with pytest.raises(UnusableInput, match="without_models: there is no registered model 'nosuch'"):
+        load_suite(str(path))
 
 
 NETWORKS = ("conv1d", "decoder", "encoder", "gru", "inception", "inception_regularised", "lstm", "srnn", "tcn", "tcns")
@@ -144,5 +158,5 @@ def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones():
-    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are crossover, full, paper, smoke"):
+    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are benchmark, crossover, full, paper, smoke"):
         load_suite("nosuch")

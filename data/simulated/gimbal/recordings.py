@@ -64,15 +64,16 @@ def gimbal(
     readings that differs from experiment to experiment. n_init is 40 samples, the window of the paper's
     networks, so that every model may fill one such window before it is on its own.
 
-    Parameters may stand behind the name, "gimbal-data0.25-noise4": how many times the usual training experiments, noise
-    of both readings, Coulomb friction, drift of both readings and stiffness of the cable it has; the delay of the
-    input in s; n_init. What is not changed stays the same experiment. Raises UnusableInput.
+    Parameters may stand behind the name, "gimbal-data0.25-noise4": how many times the usual training experiments,
+    noise of both readings, Coulomb friction, drift of both readings and stiffness of the cable it has; the delay of
+    the input in s; n_init. What is not changed stays the same experiment. Raises UnusableInput.
 
     Reference: "Recurrent and Convolutional approaches for System Identification", section 2.
     """
     n_train = round(N_TRAIN * data)
     if not 1 <= n_train <= MOST_TRAIN:
-        raise UnusableInput(f"gimbal: data={data:g} makes {n_train} training experiments; 1 to {MOST_TRAIN} can be made")
+        made = f"data={data:g} makes {n_train} training experiments"
+        raise UnusableInput(f"gimbal: {made}; 1 to {MOST_TRAIN} can be made")
     usual = DEFAULT
     parameters = replace(
         usual,
