@@ -83,10 +83,10 @@ class Regression:
         for at in range(0, len(r), CHUNK):
             phi = _features(r[at : at + CHUNK], centres, root, gamma)
             both = np.concatenate((phi, y[at : at + CHUNK]), axis=1)
-            triangle = np.linalg.qr(np.concatenate((triangle, both)), mode="r")
-        count = triangle.shape[1] - y.shape[1]
-        left, values, vectors = np.linalg.svd(triangle[:, :count], full_matrices=False)
-        return cls(centres, root, gamma, vectors.T, values, left.T @ triangle[:, count:])
+            triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, both)), mode="r"))
+        of_phi, of_y = np.split(triangle, [triangle.shape[1] - y.shape[1]], axis=1)
+        left, values, vectors = np.linalg.svd(of_phi, full_matrices=False)
+        return cls(centres, root, gamma, vectors.T, values, left.T @ of_y)
 
     def solution(self, ridge: float) -> tuple[Float[np.ndarray, "n1 ny"], Float[np.ndarray, "m ny"]]:
         """Compute the linear part and the weights of the kernels; ridge is the noise variance over the prior's."""
