@@ -79,7 +79,7 @@ def _winners(found: Sequence[Standing], datasets: Sequence[str]) -> Table:
             continue
         classical, network = (max(group, key=_fit) for group in groups)
         ratio, low, high = _ratio(network, classical)
-        winner = "network" if high < 1 else classical.model if low > 1 else "neither"
+        winner = "network" if high < 1 else "classical" if low > 1 else "neither"
         cells = [Cell(text) for s in (classical, network) for text in (s.model, f"{_fit(s):.1f}")]
         rows.append([Cell(dataset), *cells, Cell(f"{ratio:.2f} ({low:.2f} to {high:.2f})"), Cell(winner)])
     columns = ["data set", "best classical", "fit %", "best network", "fit %", "error ratio", "winner"]

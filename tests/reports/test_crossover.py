@@ -53,7 +53,7 @@ def test_the_winner_is_the_one_whose_error_is_smaller_beyond_chance():
     table = crossover_tables(study([0.3, 0.15, 0.6, 0.3, 0.2]))[0]
     winners = {row[0].text: row[-1].text for row in table.rows}
     assert winners == {
-        "gimbal": "neither", "gimbal-noise0": "network", "gimbal-noise4": "arx", "gimbal-data0.5": "neither",
+        "gimbal": "neither", "gimbal-noise0": "network", "gimbal-noise4": "classical", "gimbal-data0.5": "neither",
         "gimbal-friction2-drift0": "network",
     }  # fmt: skip
     assert next(iter(winners)) == "gimbal"
@@ -82,12 +82,12 @@ def test_seeds_and_failures_have_their_place():
         row for dataset in NAMES for row in rows("lstm", dataset, 0.6, network=True, seed=1)
     ]  # fmt: skip
     winners = {row[0].text: row[-1].text for row in crossover_tables(results)[0].rows}
-    assert winners["gimbal"] == "arx"  # the mean of the squares of both seeds
+    assert winners["gimbal"] == "classical"  # the mean of the squares of both seeds
     nothing = failed_metrics(Channels((Channel("u"),), (Channel("phi", "deg"),)))
     gone = [replace(row, status="diverged", metrics=nothing) if row.model == "lstm" else row for row in results]
     assert crossover_tables(gone)[0].rows == []
     some = [a if a.seed == 1 and a.dataset == "gimbal" else b for a, b in zip(gone, results, strict=True)]
-    assert crossover_tables(some)[0].rows[0][-1].text == "arx"  # one of two seeds
+    assert crossover_tables(some)[0].rows[0][-1].text == "classical"  # one of two seeds
 
 
 def test_curves_are_drawn_for_what_is_known_everywhere():
