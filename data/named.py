@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from simgap.records import Dataset, UnusableInput
 from simgap.registry import DATASETS
 
-PARAMETER = re.compile(r"([a-z_]+)(\d+(?:\.\d+)?)")
+PARAMETER = re.compile(r"([a-z_]+)(\d{1,9}(?:\.\d{1,9})?)")
 
 
 def is_registered(text: str) -> bool:
@@ -22,7 +22,7 @@ def is_registered(text: str) -> bool:
     if text in DATASETS:
         return True
     name, *pieces = text.split("-")
-    return name in DATASETS and all(map(PARAMETER.fullmatch, pieces)) and not Path(text).exists()
+    return name in DATASETS and all(map(PARAMETER.fullmatch, pieces)) and not os.path.exists(text)  # noqa: PTH110, it never raises
 
 
 def load_registered(text: str) -> Dataset:
