@@ -55,7 +55,8 @@ def parameters_of(text: str) -> tuple[str, dict[str, float]]:
     name, *pieces = text.split("-")
     if text in DATASETS or name not in DATASETS or not all(map(PARAMETER.fullmatch, pieces)):
         return text, {}
-    return name, {key: float(value) for key, value in (PARAMETER.findall(piece)[0] for piece in pieces)}
+    changed = {key: float(value) for key, value in (PARAMETER.findall(piece)[0] for piece in pieces)}
+    return (name, changed) if changed.keys() <= usual_parameters(name).keys() else (text, {})
 
 
 def usual_parameters(name: str) -> dict[str, float]:

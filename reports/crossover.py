@@ -47,7 +47,7 @@ class Sweep:
 
 def of_crossover(results: Sequence[Result]) -> bool:
     """Tell whether results are of one machine under several conditions."""
-    return len({row.dataset for row in results if parameters_of(row.dataset)[1]}) >= FEWEST
+    return sum(bool(parameters_of(dataset)[1]) for dataset in {row.dataset for row in results}) >= FEWEST
 
 
 def sweeps(datasets: Sequence[str]) -> list[Sweep]:
@@ -122,7 +122,7 @@ def drawn(results: Sequence[Result], colours: Sequence[str]) -> Figure:
 
     panels = curves(results)
     models = best_models(panels)[: len(colours)]
-    rows = -(-len(panels) // 2)
+    rows = max(1, -(-len(panels) // 2))
     figure = Figure(figsize=(7.0, 2.3 * rows), layout="constrained")
     all_axes: list[Any] = list(figure.subplots(rows, 2, squeeze=False, sharey=True).flat)
     for axes, (sweep, of_model) in zip(all_axes, panels, strict=False):
@@ -165,7 +165,7 @@ def _ratio(a: Standing, b: Standing) -> tuple[float, float, float]:
     ratio = float(np.exp(log_ratio(*losses)))
     if not math.isfinite(ratio):
         return ratio, ratio, ratio
-    if len(losses[0]) < 2:
+    if len(losses[0]) < 2 or len(losses[0]) != len(losses[1]):
         return ratio, 0.0, math.inf
     found = bootstrap(
         losses, log_ratio, paired=True, n_resamples=RESAMPLINGS, method="percentile", rng=np.random.default_rng(0)
