@@ -19,30 +19,35 @@ def is_registered(text: str) -> bool:
 
     A file or folder whose name looks like one with parameters is what it is.
     """
-    if text in DATASETS:
-        return True
-    name, *pieces = text.split("-")
-    return name in DATASETS and all(map(PARAMETER.fullmatch, pieces)) and not os.path.exists(text)  # noqa: PTH110, it never raises
+    return text in DATASETS or (_split(text) is not None and not os.path.exists(text))  # noqa: PTH110, it never raises
 
 
 def load_registered(text: str) -> Dataset:
     """Make a registered data set; its name holds the parameters that are not the usual ones. Raises UnusableInput."""
-    if text in DATASETS:
+    split = _split(text)
+    if split is None:
         return DATASETS[text]()
-    name, *pieces = text.split("-")
+    name, pairs = split
     usual = usual_parameters(name)
-    given = _numbers(name, pieces, usual)
+    given = _numbers(name, pairs, usual)
     changed = [f"{key}{given[key]:.15g}" for key in usual if given.get(key, usual[key]) != usual[key]]
     return replace(DATASETS[name](**given), name="-".join([name, *changed]))
 
 
-def _numbers(name: str, pieces: Sequence[str], usual: Mapping[str, float]) -> dict[str, float]:
+def _split(text: str) -> tuple[str, list[tuple[str, str]]] | None:
+    """Split "gimbal-noise4" into the name and the pairs of parameter and number; None for any other text."""
+    name, *pieces = text.split("-")
+    if text in DATASETS or name not in DATASETS or not all(map(PARAMETER.fullmatch, pieces)):
+        return None
+    return name, [PARAMETER.findall(piece)[0] for piece in pieces]
+
+
+def _numbers(name: str, pairs: Sequence[tuple[str, str]], usual: Mapping[str, float]) -> dict[str, float]:
     numbers: dict[str, float] = {}
-    for piece in pieces:
-        key, number = PARAMETER.findall(piece)[0]
+    for key, number in pairs:
         if key not in usual or key in numbers:
             takes = f"it takes {', '.join(usual)}, each once" if usual else "it takes none"
-            raise UnusableInput(f"data set {name} has no parameter {piece!r}; {takes}")
+            raise UnusableInput(f"data set {name} has no parameter {key + number!r}; {takes}")
         value = float(number)
         if isinstance(usual[key], int) and value != round(value):
             raise UnusableInput(f"data set {name}: {key} is a whole number, such as {usual[key]}")
@@ -52,10 +57,11 @@ def _numbers(name: str, pieces: Sequence[str], usual: Mapping[str, float]) -> di
 
 def parameters_of(text: str) -> tuple[str, dict[str, float]]:
     """Split a name such as "gimbal-noise4" into the data set's own and its parameters; of any other there are none."""
-    name, *pieces = text.split("-")
-    if text in DATASETS or name not in DATASETS or not all(map(PARAMETER.fullmatch, pieces)):
+    split = _split(text)
+    if split is None:
         return text, {}
-    changed = {key: float(value) for key, value in (PARAMETER.findall(piece)[0] for piece in pieces)}
+    name, pairs = split
+    changed = {key: float(number) for key, number in pairs}
     return (name, changed) if changed.keys() <= usual_parameters(name).keys() else (text, {})
 
 

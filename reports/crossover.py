@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import bootstrap
 
 from simgap.data.named import parameters_of, usual_parameters
 from simgap.records import Result
@@ -73,14 +73,14 @@ def crossover_tables(results: Sequence[Result]) -> list[Table]:
 def _winners(found: Sequence[Standing], datasets: Sequence[str]) -> Table:
     rows = []
     for dataset in sorted(datasets, key=_place):
-        here = [s for s in found if s.dataset == dataset and math.isfinite(_fit(s))]
+        here = [s for s in found if s.dataset == dataset and math.isfinite(s.median_fit)]
         groups = [s for s in here if not _is_network(s)], [s for s in here if _is_network(s)]
         if not all(groups):
             continue
-        classical, network = (max(group, key=_fit) for group in groups)
+        classical, network = (max(group, key=attrgetter("median_fit")) for group in groups)
         ratio, low, high = _ratio(network, classical)
         winner = "network" if high < 1 else "classical" if low > 1 else "neither"
-        cells = [Cell(text) for s in (classical, network) for text in (s.model, f"{_fit(s):.1f}")]
+        cells = [Cell(text) for s in (classical, network) for text in (s.model, f"{s.median_fit:.1f}")]
         rows.append([Cell(dataset), *cells, Cell(f"{ratio:.2f} ({low:.2f} to {high:.2f})"), Cell(winner)])
     columns = ["data set", "best classical", "fit %", "best network", "fit %", "error ratio", "winner"]
     notes = [
@@ -157,6 +157,8 @@ def best_models(panels: Sequence[tuple[Sweep, dict[str, list[Spread]]]]) -> list
 
 def _ratio(a: Standing, b: Standing) -> tuple[float, float, float]:
     """Divide the free-run error of one model by that of another, with the 95 % interval (Efron and Tibshirani 1993)."""
+    from scipy.stats import bootstrap
+
     losses = _losses(a), _losses(b)
 
     def log_ratio(of_a: np.ndarray, of_b: np.ndarray, axis: int = -1) -> Any:
@@ -200,8 +202,3 @@ def _spread(found: Sequence[Standing], model: str, dataset: str) -> Spread | Non
 
 def _is_network(standing: Standing) -> bool:
     return any(row.provenance.get("stochastic") for row in standing.rows)
-
-
-def _fit(standing: Standing) -> float:
-    fit = standing.fit_percent()
-    return fit.median if fit else -math.inf

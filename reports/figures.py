@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,9 +51,9 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
             written[-1].write_text(to_latex(tables[title]), encoding="utf-8")
     for suite, standings in collection.standings.items():
         if crossover.of_crossover(collection.suites[suite]):
-            written += _saved(crossover.drawn(collection.suites[suite], COLOURS), out / f"{file_names([suite])[suite]}")
+            written += _saved(crossover.drawn(collection.suites[suite], COLOURS), out / file_names([suite])[suite])
         for dataset in collection.datasets:
-            here = sorted((s for s in standings if s.dataset == dataset), key=_fit, reverse=True)
+            here = sorted((s for s in standings if s.dataset == dataset), key=attrgetter("median_fit"), reverse=True)
             name = file_names([f"{suite}-{dataset}"])[f"{suite}-{dataset}"]
             if figure := _horizons(here[:BEST]):
                 written += _saved(figure, out / f"{name}-horizon")
@@ -160,8 +161,3 @@ def _plain(text: str) -> str:
 
 def _with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
-
-
-def _fit(standing: Standing) -> float:
-    fit = standing.fit_percent()
-    return fit.median if fit else -math.inf

@@ -44,6 +44,12 @@ class Standing:
         """Compute 100 (1 - sqrt(mean over the outputs of nrmse^2)) of the free run over all test experiments."""
         return self._spread(_pooled_fit, "free_run", ())
 
+    @property
+    def median_fit(self) -> float:
+        """The median over the seeds of the fit in percent; minus infinity where there is none."""
+        fit = self.fit_percent()
+        return fit.median if fit else -math.inf
+
     def rmse_at(self, output: str, horizon: str) -> Spread | None:
         """Pool the RMSE of the forecast `horizon` samples ahead, over all test experiments."""
 

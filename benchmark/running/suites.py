@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap.records import UnusableInput
-from simgap.registry import DATASETS, MODELS
+from simgap.registry import DATASETS, MODELS, Registry
 from simgap.tasks import TASKS, USUAL
 
 FOLDER = Path(__file__).parent / "suites"
@@ -96,10 +96,7 @@ class _Reader:
 
     def _datasets(self) -> tuple[str, ...]:
         given = self._get("datasets", (list, str), "all")
-        without = self._get("without", list, [""])
-        for name in without:
-            if name and name not in DATASETS:
-                raise UnusableInput(f"{self.path}: without: there is no registered data set {name!r}")
+        without = self._left_out("without", DATASETS, "data set")
         if given == "all":
             return tuple(name for name in DATASETS if name not in without)
         if "without" in self.table:
@@ -111,10 +108,7 @@ class _Reader:
     def _models(self) -> Iterable[Entry]:
         """The entries of the tables; one with the name of a model that `all` has brought takes its place."""
         given = self._get("models", (list, str), "all")
-        without = self._get("without_models", list, [""])
-        for name in without:
-            if name and name not in MODELS:
-                raise UnusableInput(f"{self.path}: without_models: there is no registered model {name!r}")
+        without = self._left_out("without_models", MODELS, "model")
         tables = [{"name": "all"}] if given == "all" else given
         if isinstance(tables, str) or not all(isinstance(table, dict) for table in tables):
             raise UnusableInput(f'{self.path}: models must be "all" or tables headed [[models]]')
@@ -162,6 +156,14 @@ class _Reader:
             if "all" in members:
                 raise UnusableInput(f"{self.path}: the group {name} cannot hold all; give all a table of its own")
         return groups
+
+    def _left_out(self, key: str, registry: Registry, kind: str) -> list[str]:
+        """The registered names under the key, that "all" does not bring."""
+        names = self._get(key, list, [""])
+        for name in names:
+            if name and name not in registry:
+                raise UnusableInput(f"{self.path}: {key}: there is no registered {kind} {name!r}")
+        return names
 
     def _gpus(self, table: dict[str, Any]) -> float:
         gpus = table.get("gpus", 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from operator import attrgetter
 from pathlib import Path
 
 from simgap.data import describe
@@ -142,7 +143,7 @@ class _Site:
         several = len({run.suite for run in here}) > 1
         listed = [
             {"key": self._key(run), "label": f"{run.standing.model} ({run.suite})" if several else run.standing.model}
-            for run in sorted(here, key=_fit, reverse=True)
+            for run in sorted(here, key=attrgetter("standing.median_fit"), reverse=True)
         ]
         models, _ = self._links("../")
         tables = [
@@ -257,11 +258,6 @@ def diagnoses_pages(writer: Writer, found: list[diagnoses.Found]) -> None:
     if found:
         listed = [(one, f"diagnoses/{keys[one.name]}.html") for one in found]
         writer.page("diagnoses.html", "diagnoses.html", found=listed)
-
-
-def _fit(run: Run) -> float:
-    fit = run.standing.fit_percent()
-    return fit.median if fit else float("-inf")
 
 
 def _what(label: str) -> str:
