@@ -1,8 +1,9 @@
-"""The recurrent layers of PyTorch, two of them with a pass through time of our own on the CPU.
+"""The recurrent layers of PyTorch, with a pass through time of our own on the CPU.
 
-PyTorch records every small operation of every sample of an RNN or GRU there, which takes longer than the operations
-themselves. Here the pass and its derivative are one compiled loop each, and the gradients of the weights one product
-over all samples. Its LSTM is one such loop already (oneDNN); tests/speed/bench_torch.py compares all three.
+PyTorch records every small operation of every sample there, which takes longer than the operations themselves. Here
+the pass and its derivative are one compiled loop each, and the gradients of the weights one product over all samples.
+PyTorch's LSTM is one compiled loop, too; two narrow layers, as in the encoder, still take it 1.5 times as long as ours
+(tests/speed/bench_torch.py).
 """
 
 from __future__ import annotations
@@ -32,8 +33,10 @@ class _Pass(torch.autograd.Function):
         h, gates, inner = (np.empty((len(x), rows, x.shape[2]), arrays[0].dtype) for rows in (units, len(u), units))
         if kind == "rnn":
             kernels.run_rnn(*arrays[:3], arrays[3] + arrays[4], h)
-        else:
+        elif kind == "gru":
             kernels.run_gru(*arrays, h, gates, inner)
+        else:
+            kernels.run_lstm(*arrays[:3], arrays[3] + arrays[4], h, gates, inner)
         ctx.save_for_backward(x, w, u)
         ctx.rest = kind, only_last, h, gates, inner
         return torch.from_numpy(h[-1:] if only_last else h)
@@ -51,10 +54,12 @@ class _Pass(torch.autograd.Function):
         d_inner = d
         if kind == "rnn":
             kernels.back_rnn(ut, h, dh, only_last, d)
-        else:
+        elif kind == "gru":
             of_new = np.empty((units, steps, batch), h.dtype)
             kernels.back_gru(ut, h, gates, inner, dh, only_last, d, of_new)
             d_inner = np.concatenate((d[: 2 * units], of_new))
+        else:
+            kernels.back_lstm(ut, gates, inner, dh, only_last, d)
         flat, flat_inner = (torch.from_numpy(part.reshape(len(u), -1)) for part in (d, d_inner))  # [G H, T B]
         before = np.zeros((steps, batch, units), h.dtype)
         before[1:] = h[:-1].transpose(0, 2, 1)
@@ -69,36 +74,24 @@ class Layer(nn.Module):
 
     def states(self: Any, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T H"]:
         """Give the states at all samples."""
-        return self(x)[0]
+        return self(x)[0] if x.device.type != "cpu" else self._pass(x, False).permute(2, 0, 1)
 
     def last(self: Any, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B H"]:
         """Give the state at the last sample."""
-        return self(x)[0][:, -1]
-
-
-class Compiled(Layer):
-    """A layer whose pass on the CPU is ours."""
-
-    def states(self: Any, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T H"]:
-        """Give the states at all samples."""
-        return super().states(x) if x.device.type != "cpu" else self._pass(x, False).permute(2, 0, 1)
-
-    def last(self: Any, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B H"]:
-        """Give the state at the last sample."""
-        return super().last(x) if x.device.type != "cpu" else self._pass(x, True)[0].t()
+        return self(x)[0][:, -1] if x.device.type != "cpu" else self._pass(x, True)[0].t()
 
     def _pass(self: Any, x: Tensor, only_last: bool) -> Tensor:
         weights = (self.weight_ih_l0, self.weight_hh_l0, self.bias_ih_l0, self.bias_hh_l0)
         return _Pass.apply(x.permute(1, 2, 0).contiguous(), *weights, self.kind, only_last)
 
 
-class Srnn(Compiled, nn.RNN):
+class Srnn(Layer, nn.RNN):
     """Simple recurrent layer (Elman 1990): h(k) = tanh(W x(k) + U h(k-1) + b)."""
 
     kind = "rnn"
 
 
-class Gru(Compiled, nn.GRU):
+class Gru(Layer, nn.GRU):
     """Gated recurrent unit (Cho 2014) that resets after the product, as in cuDNN and Keras."""
 
     kind = "gru"
@@ -106,6 +99,8 @@ class Gru(Compiled, nn.GRU):
 
 class Lstm(Layer, nn.LSTM):
     """Long short-term memory (Hochreiter and Schmidhuber 1997, with the forget gate of Gers 2000)."""
+
+    kind = "lstm"
 
 
 def recurrent(layer: type[Net], inputs: int, units: int) -> Net:

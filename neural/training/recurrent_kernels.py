@@ -114,3 +114,54 @@ def back_gru(ut, h, gates, inner, dh, only_last, d, d_inner):
         for i in range(units):
             for k in range(batch):
                 e[i, k] += keep[i, k]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def run_lstm(x, w, u, offset, h, gates, cells):
+    """i, f, o = sigma(.); g = tanh(.); c(k) = f c(k-1) + i g; h(k) = o tanh(c(k)). Gates i, f, g, o as in PyTorch."""
+    steps, units, batch = h.shape
+    a, b = np.empty((4 * units, batch), u.dtype), np.zeros((4 * units, batch), u.dtype)
+    zero = np.zeros((units, batch), u.dtype)
+    for t in range(steps):
+        before = cells[t - 1] if t > 0 else zero
+        np.dot(w, x[t], a)
+        if t > 0:
+            np.dot(u, h[t - 1], b)
+        for j in range(units):
+            for k in range(batch):
+                i = sigmoid(a[j, k] + b[j, k] + offset[j])
+                f = sigmoid(a[units + j, k] + b[units + j, k] + offset[units + j])
+                g = tanh(a[2 * units + j, k] + b[2 * units + j, k] + offset[2 * units + j])
+                o = sigmoid(a[3 * units + j, k] + b[3 * units + j, k] + offset[3 * units + j])
+                c = f * before[j, k] + i * g
+                gates[t, j, k], gates[t, units + j, k] = i, f
+                gates[t, 2 * units + j, k], gates[t, 3 * units + j, k] = g, o
+                cells[t, j, k] = c
+                h[t, j, k] = o * tanh(c)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def back_lstm(ut, gates, cells, dh, only_last, d):
+    """Backward pass of `run_lstm`."""
+    steps, units, batch = cells.shape
+    e, now = np.zeros((units, batch), ut.dtype), np.empty((4 * units, batch), ut.dtype)
+    dc, zero = np.zeros((units, batch), ut.dtype), np.zeros((units, batch), ut.dtype)
+    for t in range(steps - 1, -1, -1):
+        given = t == steps - 1 or not only_last
+        before = cells[t - 1] if t > 0 else zero
+        for j in range(units):
+            for k in range(batch):
+                grad = e[j, k] + (dh[t, j, k] if given else ZERO)
+                i, f = gates[t, j, k], gates[t, units + j, k]
+                g, o = gates[t, 2 * units + j, k], gates[t, 3 * units + j, k]
+                bent = tanh(cells[t, j, k])
+                c = dc[j, k] + grad * o * (ONE - bent * bent)
+                di = c * g * i * (ONE - i)
+                df = c * before[j, k] * f * (ONE - f)
+                dg = c * i * (ONE - g * g)
+                do = grad * bent * o * (ONE - o)
+                dc[j, k] = c * f
+                now[j, k], now[units + j, k], now[2 * units + j, k], now[3 * units + j, k] = di, df, dg, do
+                d[j, t, k], d[units + j, t, k] = di, df
+                d[2 * units + j, t, k], d[3 * units + j, t, k] = dg, do
+        np.dot(ut, now, e)

@@ -14,7 +14,7 @@ def gradients(value, parts):
     return torch.autograd.grad((value * weights).sum(), parts)
 
 
-@pytest.mark.parametrize("kind", [Srnn, Gru])
+@pytest.mark.parametrize("kind", [Srnn, Gru, Lstm])
 @pytest.mark.parametrize("only_last", [False, True])
 def test_a_recurrent_layer_is_that_of_pytorch(kind, only_last):
     torch.manual_seed(0)
