@@ -11,12 +11,14 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import Noise
 from simgap.greybox.normal_equations import scales_of
 from simgap.greybox.plant import Plant
-from simgap.greybox.problem import Problem
+from simgap.greybox.problem import LARGEST_ERROR, Problem
 from simgap.greybox.samples import Records
+from simgap.greybox.simulation import Simulator
 
 INITIAL_STEPS = 15
 # What an error in training tells of one in the first samples: the second may be far smaller, and lasts.
 WEIGHTS = (0.01, 0.1, 1.0, 10.0)
+RUNS = 4  # free runs in each of few records
 
 
 def initial_states(problem: Problem, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "B q"]:
@@ -54,26 +56,52 @@ class UsualStart:
 
 
 def usual_start(plant: Plant, estimate: Estimate, records: Records, noise: Noise, n_init: int) -> UsualStart | None:
-    """Learn how the training records start, from their initial states as all of their samples tell them.
+    """Learn which initial states are to be expected, from how the training records start or what they pass through.
 
-    The scatter is that of Student's t, which the next start has after E normal ones of unknown mean and covariance S:
-    S (1 + 1/E) (E - 1) / (E - q - 2) (Gelman et al., Bayesian Data Analysis, 2013, section 3.6). How much it weighs is
-    what serves free runs in training best; None where it serves none, and where too few records tell of it.
+    Many records tell it by their own starts, few by the states at all their samples, as if the next one began at any of
+    them. How much that weighs is what serves free runs in training best, from those starts or from four of each record;
+    None where it serves none.
     """
-    theta, e, q = estimate.theta, len(estimate.local), plant.order
-    if not 0 < q < e - 2 or plant.sign_hidden or n_init >= len(records.u[0]):
+    e, q = len(estimate.local), plant.order
+    if not q or plant.sign_hidden:
         return None
-    starts = estimate.local[:, :q]
-    size = scales_of(np.var(starts, axis=0))
-    scatter = np.cov(starts.T / size[:, None]).reshape(q, q) * (1 + 1 / e) * (e - 1) / (e - q - 2)
-    precision = np.linalg.inv(scatter + 1e-9 * np.eye(q)) / size / size[:, None]
+    if q < e - 2:
+        mean, scatter = _of_starts(estimate.local[:, :q])
+        runs = records
+    else:
+        passed = Simulator(plant, records.u).states(estimate.theta[None], estimate.local[None, :, : plant.n_start])
+        states = passed[0][records.mask][:, :q]
+        if not np.max(np.abs(states)) < LARGEST_ERROR:  # it grows without bound
+            return None
+        mean, scatter = states.mean(axis=0), np.cov(states.T).reshape(q, q)
+        runs = records.pieces(max(records.mask.shape[1] // RUNS, 2 * n_init))
+        runs = runs.only(np.flatnonzero(runs.mask.all(axis=1)))
+    if n_init >= runs.u.shape[1] or len(runs.u) < 2:
+        return None
     variance = float(np.sum(noise.whiten(estimate.errors) ** 2)) / (records.samples * plant.ny)
-    beginning, whole = Problem(plant, records.beginning(n_init), noise), Problem(plant, records, noise)
-    found = initial_states(beginning, theta)
-    tried = [UsualStart(starts.mean(axis=0), weight * variance * precision) for weight in WEIGHTS]
+    precision = variance * _inverse(scatter)
+    beginning, whole = Problem(plant, runs.beginning(n_init), noise), Problem(plant, runs, noise)
+    found = initial_states(beginning, estimate.theta)
 
     def squares(local: np.ndarray) -> float:
-        return float(np.sum(noise.whiten(whole.errors(theta, local))[:, n_init:] ** 2))
+        return float(np.sum(noise.whiten(whole.errors(estimate.theta, local))[:, n_init:] ** 2))
 
-    least, best = min(((squares(one.beside(beginning, theta, found)), one) for one in tried), key=lambda pair: pair[0])
-    return best if least < squares(found) else None
+    tried = [UsualStart(mean, weight * precision) for weight in WEIGHTS]
+    of_each = [squares(one.beside(beginning, estimate.theta, found)) for one in tried]
+    return tried[int(np.argmin(of_each))] if min(of_each) < squares(found) else None
+
+
+def _of_starts(starts: Float[np.ndarray, "E q"]) -> tuple[Float[np.ndarray, " q"], Float[np.ndarray, "q q"]]:
+    """Return mean and scatter of the next start after E normal ones of unknown mean and covariance S.
+
+    The scatter is that of Student's t, S (1 + 1/E) (E - 1) / (E - q - 2) (Gelman et al., Bayesian Data Analysis, 2013,
+    section 3.6).
+    """
+    e, q = starts.shape
+    return starts.mean(axis=0), np.cov(starts.T).reshape(q, q) * (1 + 1 / e) * (e - 1) / (e - q - 2)
+
+
+def _inverse(scatter: Float[np.ndarray, "q q"]) -> Float[np.ndarray, "q q"]:
+    """Invert a covariance in units of its own, with what rounding leaves of directions that never varied."""
+    size = scales_of(np.diag(scatter))
+    return np.linalg.inv(scatter / size / size[:, None] + 1e-9 * np.eye(len(size))) / size / size[:, None]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from .parts import (
     fitted,
@@ -148,9 +149,31 @@ def test_where_records_start_anywhere_the_first_samples_decide():
     assert max(errors) < 1.1 * min(errors)
 
 
-def test_few_records_have_no_usual_start():
-    known, data, _ = axis(np.random.default_rng(5), np.zeros((4, 2)))
-    assert usual_start(known, data, white_noise(0.1), 10) is None
+def swinging_with_coloured_noise(rng, runs, samples):
+    """Records of a lightly damped position with coloured noise as large as the motion, swinging from the first sample on."""
+    known = model("position", 0.1, [0.02, 0.2], 0.5)
+    u = steps(rng, (runs, 200 + samples))
+    y, _ = free_run(position(damping=0.02, stiffness=0.2, gain=0.5), u, 0.1)
+    off = lfilter([1.0], [1.0, -0.95], rng.standard_normal(y.shape), axis=1)
+    y += float(np.std(y)) / float(np.std(off)) * off
+    return known, records(u[:, 200:], y[:, 200:], 0.1)
+
+
+def test_a_single_record_tells_by_what_it_passes_through_where_the_next_one_may_begin():
+    rng, weighing = np.random.default_rng(6), white_noise(1.0)
+    known, training = swinging_with_coloured_noise(rng, 1, 2000)
+    usual = usual_start(known, training, weighing, 10)
+    _, others = swinging_with_coloured_noise(rng, 8, 500)
+    beginning = others.beginning(10)
+    without = initial_states(known, beginning, weighing)
+    within = usual.beside(problem_of(known, beginning, weighing), known.theta, without)
+    errors = [np.sqrt(np.mean((simulated(known, others, local) - others.y)[:, 10:] ** 2)) for local in (without, within)]
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_a_record_too_short_for_several_runs_has_no_usual_start():
+    known, data, _ = axis(np.random.default_rng(5), np.zeros((1, 2)))
+    assert usual_start(known, data.beginning(30), white_noise(0.1), 10) is None
 
 
 @pytest.mark.filterwarnings("error")
