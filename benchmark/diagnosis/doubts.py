@@ -52,12 +52,16 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
     rival = f"A linear model of order {one.linear.baseline.plant.order}"
     plain = f"the plain one of order {baseline.plant.order}"
     nothing = "so that no effect can be held responsible for what is wrong"
-    if effects and one.linear.errs_more:
+    if not effects or one.linear.errs == "no more":
+        return f"{rival} simulates held-out {name} at least as well as {plain}{helped}, {nothing}."
+    if one.linear.errs == "more":
         return (
-            f"{rival} has likelier one-step errors in training than {plain}{helped}, though it simulates held-out "
-            f"{name} worse. Neither is the machine, {nothing}."
+            f"{rival} is likelier than {plain}{helped}, which does not simulate held-out {name} clearly better, {nothing}."
         )
-    return f"{rival} simulates held-out {name} at least as well as {plain}{helped}, {nothing}."
+    return (
+        f"{rival} has likelier one-step errors in training than {plain}{helped}, though it simulates held-out {name} "
+        f"worse. Neither is the machine, {nothing}."
+    )
 
 
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:

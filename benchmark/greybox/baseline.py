@@ -35,6 +35,7 @@ class Baseline:
     n_init: int  # samples from which a record is simulated
     cut: bool = False  # long records were cut in pieces, so that nothing can be said of single experiments
     outliers: tuple[Outliers, ...] = ()  # found in the readings, and left out of both records
+    orders: tuple[Estimate, ...] = ()  # plain models of all orders that were tried; none where the kind gives the order
 
     def __post_init__(self) -> None:
         """Weigh the errors of the plain model as those of all models that it is compared with."""

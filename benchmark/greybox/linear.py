@@ -56,17 +56,17 @@ def find_baseline(
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
     kind = channels.outputs[outputs[0]].kind
-    models = plain_models(records, held_out, kind, n_init)
+    models, orders = plain_models(records, held_out, kind, n_init)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
     outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
-        models = plain_models(records, held_out, kind, n_init)
+        models, orders = plain_models(records, held_out, kind, n_init)
 
     def baseline_of(plain: Estimate) -> Baseline:
         plain = scaled(plain, records, channels, outputs)
-        return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers))
+        return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
     baseline = baseline_of(models[-1])
     to_beat = block_errors(baseline.estimate, baseline.valid, n_init)
@@ -113,16 +113,18 @@ def _instead_of_order(term: Term, plant: Plant) -> bool:
     return not term.channel and (term.effect.instead_of_order or (plant.imposed and term.effect.memory > 0))
 
 
-def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> list[Estimate]:
+def plain_models(
+    train: Records, valid: Records, kind: Kind, n_init: int
+) -> tuple[list[Estimate], tuple[Estimate, ...]]:
     """Fit plain linear models: order 1 for a velocity, 2 for a position, else up to what held-out data ask for.
 
-    The last one is the simplest whose held-out error is within a standard error of the best.
+    The last one of the list is the simplest whose held-out error is within a standard error of the best, and the ones
+    before it are simpler; beside it stand all that were tried.
     """
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
-        return [
-            fit_plain(Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2), train)
-        ]
+        plant = Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2)
+        return [fit_plain(plant, train)], ()
     single = kind != "level" and nu == 1
     models = linear_models(train, range(3, MAX_ORDER + 1)) if single else []
     tried: list[tuple[Estimate, np.ndarray]] = []
@@ -152,7 +154,7 @@ def plain_models(train: Records, valid: Records, kind: Kind, n_init: int) -> lis
         worse = squares - best
         if worse.mean() <= worse.std() / math.sqrt(len(worse)):
             break
-    return chosen
+    return chosen, tuple(fit for fit, _ in tried)
 
 
 def _of_order(

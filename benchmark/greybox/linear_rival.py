@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.held_out import block_errors, in_most
-from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline
+from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
 from simgap.greybox.trial import CONSISTENT, score_gain
@@ -19,27 +22,34 @@ BEYOND = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LinearRival:
-    """A linear model that the effects do not beat, and whether it errs more than they do in most held-out blocks.
+    """A linear model that the effects do not beat, and how much it errs on held-out data beside them.
 
-    Then its one-step errors in training are likelier all the same.
+    Where it errs more, its one-step errors in training are likelier all the same; clearly so if in most blocks.
     """
 
     baseline: Baseline
-    errs_more: bool
+    errs: Literal["no more", "more", "clearly more"]
+
+    @classmethod
+    def of(cls, linear: Baseline, gain: np.ndarray) -> LinearRival:
+        """Compare the squared errors of held-out blocks: those with effects less those of the linear model."""
+        return cls(linear, "no more" if gain.mean() >= 0 else "clearly more" if in_most(-gain) else "more")
 
 
 def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> LinearRival | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
     What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear
-    model itself, of few parameters, and is believed as long as more of them hardly help. None too for an output that is
-    no motion and no level, whose plain model is this one already, and where effects are of single experiments and
-    cannot be forecast.
+    model itself, of few parameters, and is believed as long as more of them hardly help. None too where effects are of
+    single experiments and cannot be forecast. The orders of an output that is no motion and no level have been tried
+    already; see `_of_tried_order`.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
     output, *others = plain.outputs
-    if plain.plant.kind == "other" or others or chosen.plant.per_experiment:
+    if others or chosen.plant.per_experiment:
         return None
+    if plain.plant.kind == "other":
+        return _of_tried_order(selection, channels)
     whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     with_effects, without, of_linear = (
@@ -51,6 +61,25 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
         better = better and gain.mean() > BEYOND * (without.mean() - with_effects.mean())
-        return LinearRival(linear, errs_more=False) if better else None
+        return LinearRival.of(linear, gain) if better else None
     beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    return None if beaten else LinearRival(linear, errs_more=in_most(-gain))
+    return None if beaten else LinearRival.of(linear, gain)
+
+
+def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:
+    """Find a linear model that scores as high as the effects, and errs more than they in no more blocks than by chance.
+
+    The plain model is the simplest whose held-out error is within a standard error of the best; where noise is large
+    that is too simple a one, and what is nonlinear would stand in for the order that it lacks.
+    """
+    plain, chosen, n_init = selection.baseline, selection.trial.estimate, selection.baseline.n_init
+    if all(term.effect.visible_in_readings for term in chosen.plant.terms):
+        return None
+    with_effects = block_errors(chosen, plain.valid, n_init)
+    likely = [fit for fit in plain.orders if score_gain(plain, chosen, plain, fit) <= BETTER]
+    gains = [(with_effects - block_errors(fit, plain.valid, n_init), fit) for fit in likely]
+    gains = [(gain, fit) for gain, fit in gains if not in_most(-gain)]
+    if not gains:
+        return None
+    gain, best = max(gains, key=lambda rival: rival[0].mean())
+    return LinearRival.of(replace(plain, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)

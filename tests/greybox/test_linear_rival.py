@@ -2,10 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from simgap.data.simulated import field, rigs
 from simgap.diagnosis.diagnose import diagnose
 from simgap.greybox.identification import identify
+from simgap.records import TrainingSet
+
+from .parts import channels, experiments
+from .plants import free_run, position, steps
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +63,22 @@ def test_an_effect_that_is_there_is_not_beaten(rig, effects):
 def test_where_effects_do_better_the_answer_shows_no_other_linear_model():
     answer = diagnose(rigs.hide("cart", {"coulomb_friction": 1.0}, noise=0.05, seed=3), views_too=False)
     assert answer.to_json()["linear"] is None
+
+
+def two_lags_in_coloured_noise(rng, samples):
+    """A record of two lags, read with coloured noise as large as the output."""
+    u = steps(rng, (1, samples))
+    y, _ = free_run(position(stiffness=4.0, damping=4.0, gain=4.0), u, 0.1)
+    noise = lfilter([1.0], [1.0, -0.98], rng.standard_normal(y.shape), axis=1)
+    return experiments(u, y + np.sqrt(1 - 0.98**2) * np.std(y) * noise, 0.1)
+
+
+def test_a_delay_does_not_stand_for_an_order_that_held_out_noise_left_out():
+    rng = np.random.default_rng(4)
+    train, valid = (tuple(two_lags_in_coloured_noise(rng, samples)) for samples in (700, 250))
+    (one,) = identify(TrainingSet(train, valid, 10, channels("other")))
+    assert one.selection.baseline.plant.order == 1
+    assert one.selection.trial.names == ("input_delay",)
+    assert one.linear is not None
+    assert one.linear.baseline.plant.order > 1
+    assert one.plant.estimate.plant.terms == ()
