@@ -158,7 +158,8 @@ class Trace:
 class Gain:
     """Free-run RMSE on the test split per output; share is 1 - after/before over all outputs, with a 95 % interval.
 
-    After is the model with the causes or, where they are only suspected, with the suspects.
+    After is the model with the causes or, where they are only suspected, with the suspects; `beats_mean` tells whether
+    it errs less than the mean of the test data would, on some output.
     """
 
     before: dict[str, float]
@@ -166,6 +167,12 @@ class Gain:
     share: float
     low: float
     high: float
+    beats_mean: bool = True
+
+    @property
+    def shown(self) -> bool:
+        """Whether the test data show that the causes help a simulation that is worth having."""
+        return self.low > 0 and self.beats_mean
 
 
 @dataclass(frozen=True)

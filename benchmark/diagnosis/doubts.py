@@ -52,6 +52,8 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
     rival = f"A linear model of order {one.linear.baseline.plant.order}"
     plain = f"the plain one of order {baseline.plant.order}"
     nothing = "so that no effect can be held responsible for what is wrong"
+    if effects and one.linear.baseline.plant.order == baseline.plant.order:
+        return f"{rival} simulates held-out {name} at least as well without {' and '.join(effects)}, {nothing}."
     if not effects or one.linear.errs == "no more":
         return f"{rival} simulates held-out {name} at least as well as {plain}{helped}, {nothing}."
     if one.linear.errs == "more":

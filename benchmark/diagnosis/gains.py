@@ -47,6 +47,7 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     errors = [_bounded((y - np.concatenate(y_hat)) / scale) for y_hat in (before, after)]
     squares = [error**2 for error in errors]
     rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of scale
+    beats_mean = bool(np.any(rmse[1] < 1))
     rmse = [np.where(error < GROWN, error * scale, np.inf) for error in rmse]
     loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
     lengths = np.array([len(x) - n for x in dataset.test if len(x) > n])
@@ -55,7 +56,7 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     share, low, high = (value if value > -GROWN else -np.inf for value in shares)
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
-    return Gain(rmse_before, rmse_after, share, low, high)
+    return Gain(rmse_before, rmse_after, share, low, high, beats_mean)
 
 
 def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[str, dict[str, float]]:

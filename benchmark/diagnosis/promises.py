@@ -65,7 +65,7 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
         gain = gains.measure(dataset, before, after)
         suspected = suspected or Promise((), found, (), model, after, gain)
-        if gain.low > 0:
+        if gain.shown:
             causes = found if count == len(listed) else _causes(kept, profiles)
             named = {cause.key for cause in causes}
             rest = tuple(cause for cause in found if cause.key not in named)

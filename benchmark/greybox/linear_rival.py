@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
 from simgap.greybox.position_and_velocity import with_kind
@@ -67,19 +68,26 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
 
 
 def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:
-    """Find a linear model that scores as high as the effects, and errs more than they in no more blocks than by chance.
+    """Find a linear model that does as well as the effects among the orders that were tried for the plain one.
 
     The plain model is the simplest whose held-out error is within a standard error of the best; where noise is large
-    that is too simple a one, and what is nonlinear would stand in for the order that it lacks.
+    that is too simple a one, and effects would stand in for the order that it lacks. A rival scores as high as they and
+    errs more in no more held-out blocks than by chance; or it is the best on held-out data, and errs less in most.
     """
     plain, chosen, n_init = selection.baseline, selection.trial.estimate, selection.baseline.n_init
-    if all(term.effect.visible_in_readings for term in chosen.plant.terms):
+    if not plain.orders or all(term.effect.visible_in_readings for term in chosen.plant.terms):
         return None
     with_effects = block_errors(chosen, plain.valid, n_init)
-    likely = [fit for fit in plain.orders if score_gain(plain, chosen, plain, fit) <= BETTER]
-    gains = [(with_effects - block_errors(fit, plain.valid, n_init), fit) for fit in likely]
-    gains = [(gain, fit) for gain, fit in gains if not in_most(-gain)]
-    if not gains:
-        return None
-    gain, best = max(gains, key=lambda rival: rival[0].mean())
+    rivals = [(with_effects - block_errors(fit, plain.valid, n_init), fit) for fit in plain.orders]
+    gain, best = max(rivals, key=_mean_gain)
+    if not in_most(gain):
+        alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
+        alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= BETTER]
+        if not alike:
+            return None
+        gain, best = max(alike, key=_mean_gain)
     return LinearRival.of(replace(plain, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
+
+
+def _mean_gain(rival: tuple[np.ndarray, Estimate]) -> float:
+    return float(rival[0].mean())

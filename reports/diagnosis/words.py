@@ -33,6 +33,11 @@ def headline(findings: Findings) -> str:
         change = f"{'falls' if gain.share >= 0 else 'rises'} by {percent(abs(gain.share))}{_range(findings)}"
     else:
         change = "cannot be compared, because a simulation diverges"
+    if findings.verdict == "suspected" and gain.low > 0:
+        return (
+            f"Suspected, not shown: {listed}. The training data ask for {them}, but with {them} the simulation still errs "
+            f"more on the test experiments than their mean would: the free-run error {change}."
+        )
     if findings.verdict == "suspected":
         helps = "they help" if several else "it helps"
         says = f"speak against {them}" if gain.high < 0 else f"do not show that {helps}"

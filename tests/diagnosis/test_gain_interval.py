@@ -166,6 +166,16 @@ def test_the_gain_is_that_of_the_root_mean_square_errors():
     assert (gain.before["y"], gain.after["y"], gain.share) == pytest.approx((0.4, 0.1, 0.75), rel=1e-9)
 
 
+@pytest.mark.parametrize(("size", "shown"), [(0.9, True), (1.1, False)])
+def test_a_simulation_that_errs_more_than_the_mean_of_the_data_shows_nothing(size, shown):
+    rng = np.random.default_rng(9)
+    y = [rng.standard_normal((400, 1)) for _ in range(3)]
+    spread = np.std(np.concatenate([part[2:] for part in y]))
+    gain = measure(dataset(y), *([part[2:] + of * spread for part in y] for of in (5.0, size)))
+    assert gain.low > 0
+    assert (gain.beats_mean, gain.shown) == (shown, shown)
+
+
 @pytest.mark.slow
 def test_nothing_is_named_as_seldom_as_promised_and_what_is_there_is_found():
     rows = list(STUDY["study"](400))

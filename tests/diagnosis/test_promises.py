@@ -100,3 +100,12 @@ def test_a_name_that_is_withdrawn_is_told_beside_the_one_that_stays(two_effects,
     assert answer.verdict == "named"
     assert (len(answer.causes), len(answer.suspects)) == (1, 1)
     assert "Suspected besides, not shown: " in " ".join(str(answer).split())
+
+
+def test_what_helps_a_simulation_that_is_worse_than_the_mean_is_only_suspected(two_effects, monkeypatch):
+    real = gains.measure
+    monkeypatch.setattr(promises.gains, "measure", lambda *runs: replace(real(*runs), beats_mean=False))
+    answer = diagnose(two_effects, views_too=False)
+    assert (answer.verdict, answer.causes, len(answer.suspects)) == ("suspected", (), 2)
+    said = " ".join(str(answer).split())
+    assert "with them the simulation still errs more on the test experiments than their mean would" in said
