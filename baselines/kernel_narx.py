@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.kernel_regression import KernelNarx, Regression, scaled, stacked
 from simgap.baselines.estimation.narx_error import scales
+from simgap.cores import one_thread
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
 
@@ -51,7 +51,7 @@ class KernelNarxModel:
     max_centres: int = 400
     model: KernelNarx = field(init=False, repr=False)
 
-    @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
+    @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.levenberg import minimise
 from simgap.baselines.estimation.linear import simplest
 from simgap.baselines.estimation.state_space_error import StateSpaceError
+from simgap.cores import one_thread
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
 from simgap.subspace.projections import state_spaces, with_spread
@@ -48,7 +48,7 @@ class N4sid:
     horizon: int = 40
     model: StateSpace = field(init=False, repr=False)
 
-    @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
+    @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the order on train and valid, then estimate on both together; nothing here is random."""
         upper = range(EVERY + 2, self.max_order + 1, 2)

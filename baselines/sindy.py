@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.monomials import maps, monomials, regressors, values
 from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
 from simgap.baselines.estimation.thresholding import thresholded
+from simgap.cores import one_thread
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -45,7 +45,7 @@ class Sindy:
     max_degree: int = 3
     model: PolynomialNarx = field(init=False, repr=False)
 
-    @threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
+    @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the terms on train and valid, then estimate on both together; nothing here is random."""
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)

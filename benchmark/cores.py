@@ -30,18 +30,28 @@ def cores() -> int:
 
 
 @contextmanager
-def all_cores() -> Iterator[None]:
-    """Have `on_cores` use all cores within this block, and linear algebra one thread.
+def one_thread() -> Iterator[None]:
+    """Have linear algebra use one thread within this block, or in the function that this decorates.
 
-    Its threads wait for each other by spinning, for very long where other programs have the cores. The processes of
-    `on_cores` are forked from this one when they are first needed, so that they import nothing. Threads gain nothing
-    here: half of their time goes by between two compiled loops. Only the main process of a program forks, and only on
-    Linux.
+    Over small matrices threads only wait for each other, by spinning, and for very long where other programs have the
+    cores.
     """
     from threadpoolctl import threadpool_limits
 
-    count = min(MOST, cores())
     with threadpool_limits(1):
+        yield
+
+
+@contextmanager
+def all_cores() -> Iterator[None]:
+    """Have `on_cores` use all cores within this block, and linear algebra one thread.
+
+    The processes of `on_cores` are forked from this one when they are first needed, so that they import nothing.
+    Threads gain nothing here: half of their time goes by between two compiled loops. Only the main process of a program
+    forks, and only on Linux.
+    """
+    count = min(MOST, cores())
+    with one_thread():
         if count < 2 or sys.platform != "linux" or multiprocessing.parent_process() is not None or _pool.get():
             yield
             return

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.armax_search import estimate_armax
 from simgap.baselines.estimation.box_jenkins_error import BoxJenkinsError
@@ -16,10 +15,11 @@ from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.levenberg import minimise, stable
 from simgap.baselines.estimation.oe_search import assemble_outputs, oe_starts
 from simgap.baselines.estimation.orders import Orders
+from simgap.cores import one_thread
 from simgap.records import Experiment
 
 
-@threadpool_limits.wrap(limits=1)  # threads would only wait for each other over so small matrices
+@one_thread()
 def estimate_box_jenkins(
     experiments: Sequence[Experiment],
     shift: Float[np.ndarray, " S"],

@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag, cho_solve, cholesky
 from scipy.optimize import minimize
-from threadpoolctl import threadpool_limits
 
 from simgap.baselines.estimation.equation_error import assemble, check_length, coefficient_names
 from simgap.baselines.estimation.fitted import LinearFit, Row
 from simgap.baselines.estimation.gram import Gram
 from simgap.baselines.estimation.orders import Orders
+from simgap.cores import one_thread
 
 Kernel = Callable[[int, float], np.ndarray]
 
@@ -55,7 +55,7 @@ def estimate_regularised(gram: Gram, orders: Orders) -> LinearFit:
         target = products[(*at, i, 0)]
         power, lengths = float(products[i, 0, i, 0]), tuple(int(n) for n in orders.nb[i] if n)
         problem = _Evidence(phi, target, power, gram.rows, lengths)
-        with threadpool_limits(1):  # thousands of small factorisations, in which threads only wait for each other
+        with one_thread():
             theta, covariance, variance = min((problem.best(kernel) for kernel in KERNELS.values()), key=_minus_log)[1]
         constants[i] = means[i, 0] - theta @ means[at]
         names = coefficient_names(regressors, ny, orders.nb.shape[1])

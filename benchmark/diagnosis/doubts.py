@@ -58,7 +58,8 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
         return f"{rival} simulates held-out {name} at least as well as {plain}{helped}, {nothing}."
     if one.linear.errs == "more":
         return (
-            f"{rival} is likelier than {plain}{helped}, which does not simulate held-out {name} clearly better, {nothing}."
+            f"{rival} is likelier than {plain}{helped}, which does not simulate held-out {name} clearly better, "
+            f"{nothing}."
         )
     return (
         f"{rival} has likelier one-step errors in training than {plain}{helped}, though it simulates held-out {name} "

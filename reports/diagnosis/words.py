@@ -33,18 +33,8 @@ def headline(findings: Findings) -> str:
         change = f"{'falls' if gain.share >= 0 else 'rises'} by {percent(abs(gain.share))}{_range(findings)}"
     else:
         change = "cannot be compared, because a simulation diverges"
-    if findings.verdict == "suspected" and gain.low > 0:
-        return (
-            f"Suspected, not shown: {listed}. The training data ask for {them}, but with {them} the simulation still errs "
-            f"more on the test experiments than their mean would: the free-run error {change}."
-        )
     if findings.verdict == "suspected":
-        helps = "they help" if several else "it helps"
-        says = f"speak against {them}" if gain.high < 0 else f"do not show that {helps}"
-        return (
-            f"Suspected, not shown: {listed}. The training data ask for {them}, but the test experiments {says}: "
-            f"with {them} the free-run error {change}."
-        )
+        return f"Suspected, not shown: {listed}. The training data ask for {them}, but {_not_shown(findings)} {change}."
     whose, corrected = ("Your", "corrected,") if findings.simulation else ("The", f"with {them}")
     wrong_numbers = findings.simulation is not None and findings.simulation.linear_differs
     listed += ", and of numbers of its linear part" * wrong_numbers
@@ -54,6 +44,20 @@ def headline(findings: Findings) -> str:
     if not findings.suspects:
         return said
     return f"{said} Suspected besides, not shown: {_listed(findings.suspects, findings)}."
+
+
+def _not_shown(findings: Findings) -> str:
+    """Say what the test experiments have against the suspects, up to how the error changes with them."""
+    gain, several = findings.gain, len(findings.effects) > 1
+    them = "them" if several else "it"
+    if gain.low > 0:
+        return (
+            f"with {them} the simulation still errs more on the test experiments than their mean would: "
+            "the free-run error"
+        )
+    helps = "they help" if several else "it helps"
+    says = f"speak against {them}" if gain.high < 0 else f"do not show that {helps}"
+    return f"the test experiments {says}: with {them} the free-run error"
 
 
 def _listed(causes: Sequence[Cause], findings: Findings) -> str:

@@ -150,7 +150,7 @@ def test_where_records_start_anywhere_the_first_samples_decide():
 
 
 def swinging_with_coloured_noise(rng, runs, samples):
-    """Records of a lightly damped position with coloured noise as large as the motion, swinging from the first sample on."""
+    """Records of a lightly damped position in motion, with coloured noise as large as the motion."""
     known = model("position", 0.1, [0.02, 0.2], 0.5)
     u = steps(rng, (runs, 200 + samples))
     y, _ = free_run(position(damping=0.02, stiffness=0.2, gain=0.5), u, 0.1)
@@ -167,7 +167,9 @@ def test_a_single_record_tells_by_what_it_passes_through_where_the_next_one_may_
     beginning = others.beginning(10)
     without = initial_states(known, beginning, weighing)
     within = usual.beside(problem_of(known, beginning, weighing), known.theta, without)
-    errors = [np.sqrt(np.mean((simulated(known, others, local) - others.y)[:, 10:] ** 2)) for local in (without, within)]
+    errors = [
+        np.sqrt(np.mean((simulated(known, others, local) - others.y)[:, 10:] ** 2)) for local in (without, within)
+    ]
     assert errors[1] < 0.8 * errors[0]
 
 
