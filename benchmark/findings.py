@@ -174,6 +174,10 @@ class Gain:
         """Whether the test data show that the causes help a simulation that is worth having."""
         return self.low > 0 and self.beats_mean
 
+    def to_json(self) -> dict[str, Any]:
+        """Return the numbers; that a simulation is worse than the mean shows in the verdict."""
+        return {key: value for key, value in vars(self).items() if key != "beats_mean"}
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -255,7 +259,7 @@ class Findings:
             "causes": [_cause(cause) for cause in self.causes],
             "suspects": [_cause(cause) | {"deciding_experiment": cause.deciding_experiment} for cause in self.suspects],
             "runner_up": self.runner_up,
-            "gain": vars(self.gain),
+            "gain": self.gain.to_json(),
             "budget": {b.output: b.to_json() for b in self.budget},
             "kinds": {name: {"kind": kind, "from": self.kinds_from.get(name)} for name, kind in self.kinds.items()},
             "doubts": list(self.doubts),

@@ -85,6 +85,14 @@ def test_a_cause_that_explains_free_runs_alone_says_so(named):
     ) in in_one_line(diagnosis_text(replace(named, causes=(cause,))))
 
 
+def test_a_suspect_that_helps_a_simulation_worse_than_the_mean_says_so(suspected):
+    gain = replace(suspected.gain, low=0.05, beats_mean=False)
+    assert in_one_line(diagnosis_text(replace(suspected, gain=gain))).startswith(
+        "cart: Suspected, not shown: Coulomb friction. The training data ask for it, but with it the simulation still "
+        "errs more on the test experiments than their mean would: the free-run error falls by 11 % (5 to 27 %)."
+    )
+
+
 def test_a_suspect_is_called_a_suspect_with_its_gain_and_what_would_decide(suspected):
     text = in_one_line(diagnosis_text(suspected))
     assert text.startswith(
