@@ -15,7 +15,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cores": set(),
     "stages": set(),
     "their_simulation": set(),
-    "findings": {"records", "their_simulation"},
+    "findings": {"records", "their_simulation", "error_views"},
     "wording": set(),
     "protocol": {"records"},
     "step_form": {"records"},
@@ -27,14 +27,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "running": GROUND | {"metrics", "tasks", "results", "data"},
     "subspace": {"records"},
     "greybox": GROUND | {"findings", "error_views", "subspace"},
-    "error_views": {"records", "metrics", "findings", "wording"},
+    "error_views": {"records", "metrics", "wording"},
     "baselines": GROUND | {"data", "greybox", "subspace"},
     "neural": GROUND | {"data"},
     "saved": GROUND | RUN | {"data"},
     "exports": GROUND | RUN | {"data", "greybox", "saved"},
     "contract": GROUND | RUN | {"data", "saved"},
     # The site shows signals from the user's copy of a data set, and what a model is.
-    "reports": {"records", "registry", "metrics", "results", "data", "findings", "wording", "greybox.effects"},
+    "reports": {"records", "registry", "metrics", "results", "data", "wording"}
+    | {"findings", "error_views", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
     "diagnosis": GROUND | RUN | {"findings", "their_simulation", "data", "greybox", "error_views", "reports"},
     "recovery": GROUND | RUN | {"findings", "data", "diagnosis"},

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from simgap.error_views.views import views
-from simgap.findings import Wrong
+from simgap.error_views.wrong import Wrong
 from simgap.records import Dataset, Experiment
 
 # Views of the error are listed when chance gives as much in fewer cases than this.

@@ -12,7 +12,7 @@ from simgap.error_views.correlation import blocks, means
 from simgap.error_views.errors import Errors
 from simgap.error_views.variables import bin_values
 from simgap.error_views.wording import between, error, mean_error, rate, span
-from simgap.findings import ViewName, Wrong
+from simgap.error_views.wrong import ViewName, Wrong
 from simgap.wording import amount, number, percent
 
 OCTAVES = 2.0 ** np.arange(-6, 1)  # upper edges of the bands, as parts of the Nyquist frequency

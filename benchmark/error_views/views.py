@@ -20,7 +20,7 @@ from simgap.error_views.variables import (
     derivative,
 )
 from simgap.error_views.wording import mean_error, rate
-from simgap.findings import ViewName, Wrong
+from simgap.error_views.wrong import ViewName, Wrong
 from simgap.metrics import is_finite
 from simgap.records import Channels, Experiment
 from simgap.wording import percent

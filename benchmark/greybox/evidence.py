@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from simgap.findings import VIEWS_OF_KINDS, Cause, Profile, Separation, Value, ViewName
+from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
+from simgap.findings import Cause, Profile, Separation, Value
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.effects.outliers import Outliers as OutlierEffect
 from simgap.greybox.fitting import descend

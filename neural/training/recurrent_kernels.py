@@ -142,16 +142,16 @@ def run_lstm(x, w, u, offset, h, gates, cells):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def back_lstm(ut, gates, cells, dh, only_last, d):
-    """Backward pass of `run_lstm`."""
+    """Run `run_lstm` backwards."""
     steps, units, batch = cells.shape
     e, now = np.zeros((units, batch), ut.dtype), np.empty((4 * units, batch), ut.dtype)
     dc, zero = np.zeros((units, batch), ut.dtype), np.zeros((units, batch), ut.dtype)
     for t in range(steps - 1, -1, -1):
-        given = t == steps - 1 or not only_last
+        has_gradient = t == steps - 1 or not only_last
         before = cells[t - 1] if t > 0 else zero
         for j in range(units):
             for k in range(batch):
-                grad = e[j, k] + (dh[t, j, k] if given else ZERO)
+                grad = e[j, k] + (dh[t, j, k] if has_gradient else ZERO)
                 i, f = gates[t, j, k], gates[t, units + j, k]
                 g, o = gates[t, 2 * units + j, k], gates[t, 3 * units + j, k]
                 bent = tanh(cells[t, j, k])

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simgap.findings import Budget, Findings, Profile, Trace, Value, Wrong
+from simgap.error_views.wrong import Wrong
+from simgap.findings import Budget, Findings, Profile, Trace, Value
 from simgap.reports.diagnosis import numbers
 from simgap.reports.diagnosis.traces import axis_range, thin
 from simgap.reports.diagnosis.words import LAST, parts_of, shorten

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simgap import wording
-from simgap.findings import Cause, Findings, Wrong
+from simgap.error_views.wrong import Wrong
+from simgap.findings import Cause, Findings
 from simgap.reports.diagnosis import figures, numbers, their_simulation, words
 from simgap.reports.diagnosis.traces import choose
 from simgap.reports.rendering import printable

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from simgap.findings import Budget, Cause, Findings, Wrong
+from simgap.error_views.wrong import Wrong
+from simgap.findings import Budget, Cause, Findings
 from simgap.reports.diagnosis import their_simulation
 from simgap.wording import number, percent
 

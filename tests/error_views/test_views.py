@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from simgap.error_views.views import views
-from simgap.findings import Wrong
+from simgap.error_views.wrong import Wrong
 from simgap.records import Channel, Channels, Experiment
 
 N_INIT, DT, HOLD = 5, 0.1, 15

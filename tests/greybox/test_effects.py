@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from simgap.data.simulated.rigs import CATALOGUE, hide, physical, suitable
 from simgap.error_views.views import views
-from simgap.findings import VIEWS_OF_KINDS, ViewName
+from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.evidence import separation
 from simgap.records import Channel, Channels, Experiment, Kind

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simgap.findings import Budget, Cause, Findings, Gain, Offer, Profile, Separation, Trace, Value, Wrong
+from simgap.error_views.wrong import Wrong
+from simgap.findings import Budget, Cause, Findings, Gain, Offer, Profile, Separation, Trace, Value
 
 HOSTILE = (
     "</script><script>alert(1)</script><img src=x onerror=alert(2)><a href='http://e.example'>\x1b[2J\u202e&lt;{{7*7}}"

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from simgap.findings import ViewName
+from simgap.error_views.wrong import ViewName
 from simgap.records import Kind
 
 Port = Literal["input", "force", "output"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-from simgap.findings import ViewName
+from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
