@@ -53,9 +53,9 @@ class Selection:
 
     def each_only(self, choices: Sequence[Sequence[Term]]) -> list[Trial]:
         """Fit each of several choices of the effects again without the others."""
-        keys = [frozenset(term.key for term in terms) for terms in choices]
+        keys = [_key(terms) for terms in choices]
         new = {key: terms for key, terms in zip(keys, choices, strict=True) if key not in self.parts}
-        new.pop(whole := frozenset(term.key for term in self.trial.terms), None)
+        new.pop(whole := _key(self.trial.terms), None)
         fits = on_cores(partial(only, self.baseline, self.trial, self.noise_order), list(new.values()))
         self.parts.update(zip(new, fits, strict=True))
         return [self.trial if key == whole else self.parts[key] for key in keys]
@@ -87,7 +87,7 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     trial = search.backward(trial)
     if baseline.plant.machine is None:  # the order of a known machine is no guess that an early choice rests on
         trial = search.exchange(trial)
-    return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended)
+    return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
 @dataclass
@@ -98,6 +98,7 @@ class _Search:
     noise_order: int = 0
     rounds: list[Round] = field(default_factory=list)
     extended: Extended = field(default_factory=dict)
+    parts: dict[frozenset[tuple[str, int]], Trial] = field(default_factory=dict)  # the last model less one effect each
 
     def visible(self, trial: Trial) -> Trial:
         """Add what the readings themselves show, before the errors of any model are asked."""
@@ -131,6 +132,8 @@ class _Search:
         while trial.terms:
             choices = [(term, special) for term in trial.terms for special in (None, *self._special_cases(term))]
             smaller = on_cores(partial(with_less, self.baseline, trial, self.noise_order), choices)
+            fitted = zip(choices, smaller, strict=True)
+            self.parts = {_key(other.terms): other for (_, special), other in fitted if special is None}
             enough = [
                 other
                 for (term, _), other in zip(choices, smaller, strict=True)
@@ -179,6 +182,10 @@ class _Search:
 
     def _without(self, trial: Trial, term: Term) -> Trial:
         return without(self.baseline, trial, self.noise_order, term)
+
+
+def _key(terms: Sequence[Term]) -> frozenset[tuple[str, int]]:
+    return frozenset(term.key for term in terms)
 
 
 def _looking(trial: Trial, linear_only: bool) -> str:

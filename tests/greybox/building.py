@@ -101,6 +101,17 @@ def pruned(search, trial):
     return _Search(search).backward(trial).names
 
 
+def without_each(search, trial):
+    """Squared errors without each effect of a pruned trial: as pruning left them, and fitted anew."""
+    pruning = _Search(search)
+    trial = pruning.backward(trial)
+    chosen = Selection(search, trial, pruning.noise_order, (), {}, dict(pruning.parts))
+    anew = replace(chosen, parts={})
+    return [
+        [selection.without(missing).estimate.squares for missing in trial.terms] for selection in (chosen, anew)
+    ], len(chosen.parts)
+
+
 def passing_alone(training):
     """The effects that are selected; each must pass against the others in the last model."""
     found = set()

@@ -5,7 +5,7 @@ import pytest
 
 from simgap.data.simulated.rigs import hide
 
-from .building import in_order, passing_alone, plain_search, pruned, sizes_of, with_effects
+from .building import in_order, passing_alone, plain_search, pruned, sizes_of, with_effects, without_each
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -28,6 +28,12 @@ def test_an_effect_that_is_not_there_is_taken_out_again(search):
 
 def test_effects_that_are_there_stay(search):
     assert set(pruned(search, with_effects(search, "constant_load", "dead_zone"))) == {"constant_load", "dead_zone"}
+
+
+def test_what_pruning_has_fitted_is_what_a_fit_without_each_effect_gives(search):
+    (kept, anew), fitted = without_each(search, with_effects(search, "constant_load", "dead_zone", "quadratic_drag"))
+    assert kept == anew
+    assert fitted == len(anew) == 2
 
 
 def test_the_effect_that_takes_most_of_the_held_out_error_comes_first(search):
