@@ -41,7 +41,7 @@ def test_an_effect_that_is_hidden_in_a_rig_is_named_first_or_suspected_if_the_re
     assert outcome.right or unsure or not outcome.visible, outcome
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.9])
+@pytest.mark.parametrize("colour", [pytest.param(0.0, marks=pytest.mark.slow), 0.9])
 def test_where_nothing_is_hidden_nothing_is_named(colour):
     seed = secrets.randbits(20)
     assert diagnose(hide("stage", {}, noise=0.1, colour=colour, seed=seed)).verdict == "nothing_found", seed
@@ -125,11 +125,13 @@ def test_the_profile_of_a_parameter_is_lowest_at_its_value(friction):
     assert profile.deviance[0] > 3.84 and profile.deviance[-1] > 3.84
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer():
     first, again = (diagnose(hide("cart", {"coulomb_friction": 0.5}, noise=0.05, seed=8), seed=3) for _ in range(2))
     assert again.to_json() | {"seconds": 0} == first.to_json() | {"seconds": 0}
 
 
+@pytest.mark.slow
 def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():
     rng = np.random.default_rng(0)
     u = np.repeat(rng.uniform(-1, 1, (150, 2)), 6, axis=0)  # [900, 2]

@@ -44,6 +44,7 @@ def test_a_second_run_computes_nothing_and_one_with_other_code_everything(tmp_pa
     assert [row.code_sha256 for row in other] == ["0" * 64] * 2
 
 
+@pytest.mark.slow
 def test_a_torn_line_is_computed_again(tmp_path):
     first, _ = run(tmp_path)
     file = tmp_path / FILE
