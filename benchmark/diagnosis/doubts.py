@@ -73,8 +73,8 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     if float(trial.blocks.sum()) < baseline.squares_of_mean:
         return None
     records, plant = baseline.train, trial.estimate.plant
-    means = np.array([y[known, 0].mean() for y, known in zip(records.y, records.mask, strict=True)])
-    within = np.sqrt(np.mean([y[known, 0].var() for y, known in zip(records.y, records.mask, strict=True)]))
+    read = [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]
+    means, within = np.array([y.mean() for y in read]), np.sqrt(np.mean([y.var() for y in read]))
     poles = -np.linalg.eigvals(plant.matrix(trial.estimate.theta)).real if plant.order else np.ones(1)
     name = channels.outputs[baseline.outputs[0]].name
     if len(means) > 1 and np.std(means) > within:

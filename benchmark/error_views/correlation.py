@@ -16,10 +16,10 @@ def correlation_time(
 
     tau = 1 + 2 sum_k rho_k over the lags k below that, at least 1. `removed` means were taken out of the error, which
     lowers every autocovariance by about removed tau / N of the variance; that is put back, because slow noise would
-    look faster than it is.
+    look faster than it is. A record may be empty, where nothing of it was measured.
     """
     products, count = np.zeros(max(lengths)), np.zeros(max(lengths))  # per lag
-    for part in np.split(error, np.cumsum(lengths)[:-1]):
+    for part in filter(len, np.split(error, np.cumsum(lengths)[:-1])):
         n = len(part)
         padded = next_fast_len(2 * n, real=True)
         products[:n] += np.fft.irfft(np.abs(np.fft.rfft(part, padded)) ** 2, padded)[:n]

@@ -67,7 +67,8 @@ class Baseline:
         """Squared errors of a model that knows the mean of each held-out record and no more, weighted as the others."""
         valid = self.valid
         known = valid.mask[:, :, None]
-        means = np.sum(np.where(known, valid.y, 0.0), axis=1, keepdims=True) / known.sum(axis=1, keepdims=True)
+        counted = np.maximum(1, known.sum(axis=1, keepdims=True))  # every reading of a record may be left out
+        means = np.sum(np.where(known, valid.y, 0.0), axis=1, keepdims=True) / counted
         return float(np.sum(np.where(known, self.noise.whiten(valid.y - means), 0.0) ** 2))
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.initial_states import initial_states
+from simgap.greybox.initial_states import initial_states, usual_start
 from simgap.greybox.noise import white
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import RESOLUTION, Records
@@ -18,16 +18,27 @@ BLOCKS = 20
 BY_CHANCE = 0.1
 
 
-def errors_on(fit: Estimate, records: Records, n_init: int) -> np.ndarray:
-    """Simulate other records with a fitted model, each from its first n_init samples: errors [E, T, ny]."""
+def errors_on(fit: Estimate, records: Records, n_init: int, train: Records | None = None) -> np.ndarray:
+    """Simulate other records with a fitted model, each from its first n_init samples: errors [E, T, ny].
+
+    Given the records of its training, their usual start counts too, as it will in the test. A few noisy samples alone
+    tell little of a slow state, and an order that has one would be blamed for its start.
+    """
     noise = white(records.sizes)
-    start = initial_states(Problem(fit.plant, records.beginning(n_init), noise), fit.theta)
+    beginning = Problem(fit.plant, records.beginning(n_init), noise)
+    start = initial_states(beginning, fit.theta)
+    usual = usual_start(fit.plant, fit, train, noise, n_init) if train is not None else None
+    if usual is not None:
+        start = usual.beside(beginning, fit.theta, start)
     return Problem(fit.plant, records, noise).errors(fit.theta, start)
 
 
-def block_errors(fit: Estimate, valid: Records, n_init: int) -> np.ndarray:
-    """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks."""
-    errors = errors_on(fit, valid, n_init) / valid.sizes
+def block_errors(fit: Estimate, valid: Records, n_init: int, train: Records | None = None) -> np.ndarray:
+    """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks.
+
+    They begin as `errors_on` does.
+    """
+    errors = errors_on(fit, valid, n_init, train) / valid.sizes
     squares = np.where(valid.mask[:, :, None], errors**2 + RESOLUTION**2, 0.0)
     blocks = np.array_split(squares, min(max(2, BLOCKS // len(squares)), squares.shape[1]), axis=1)
     return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])

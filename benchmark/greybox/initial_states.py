@@ -71,7 +71,7 @@ def usual_start(plant: Plant, estimate: Estimate, records: Records, noise: Noise
     else:
         passed = Simulator(plant, records.u).states(estimate.theta[None], estimate.local[None, :, : plant.n_start])
         states = passed[0][records.mask][:, :q]
-        if not np.max(np.abs(states)) < LARGEST_ERROR:  # it grows without bound
+        if len(states) <= q or not np.max(np.abs(states)) < LARGEST_ERROR:  # it grows without bound
             return None
         mean, scatter = states.mean(axis=0), np.cov(states.T).reshape(q, q)
         runs = records.pieces(max(records.mask.shape[1] // RUNS, 2 * n_init))

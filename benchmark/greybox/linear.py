@@ -69,7 +69,7 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
     baseline = baseline_of(models[-1])
-    to_beat = block_errors(baseline.estimate, baseline.valid, n_init)
+    to_beat = block_errors(baseline.estimate, held_out, n_init, records)
     for simpler in (fit for fit in models[:-1] if not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
@@ -83,7 +83,8 @@ def find_baseline(
 
 def _does_as_well(other: Estimate, baseline: Baseline, to_beat: np.ndarray) -> bool:
     """Tell whether a model does not err more than the plain one in most held-out blocks, and scores higher."""
-    if in_most(block_errors(other, baseline.valid, baseline.n_init) - to_beat):  # as nearly all do, at less cost
+    held_out = block_errors(other, baseline.valid, baseline.n_init, baseline.train)
+    if in_most(held_out - to_beat):  # as nearly all do, at less cost
         return False
     return score_gain(baseline, other, baseline, baseline.estimate) > 0
 
@@ -134,7 +135,7 @@ def plain_models(
         of_order = _of_order(order, kind, train, smaller, models)
         if not of_order:
             break
-        here = [(fit, block_errors(fit, valid, n_init)) for fit in of_order.values()]
+        here = [(fit, block_errors(fit, valid, n_init, train)) for fit in of_order.values()]
         likely = order <= USUAL or _likelier([fit for fit, _ in here], [fit for fit, _ in tried], train)
         known = min((squares.mean() for _, squares in tried), default=np.inf)
         smaller = of_order
@@ -173,9 +174,9 @@ def _of_order(
             found.append(fit_plain(plant, train, before))
         begun = starts(plant, models)
         further = [fit_from(plant, train, begun)] if begun else []
-        if zeros and order > 2 and not (begun and order > USUAL):
+        if zeros and order > 1 and not (begun and order > USUAL):
             # A slow pole beside its zero is found in no model without zeros.
-            further.append(fit_plain(plant, train, smaller[True]))
+            further.append(fit_plain(plant, train, smaller.get(True) or smaller[False]))
         found += [fit for fit in further if _is_of_the_input(fit, train)]
         if found:
             fits[zeros > 0] = min(found, key=lambda fit: float(np.sum(fit.errors**2)))
@@ -215,8 +216,8 @@ def first_order_hold(held: Estimate, train: Records, valid: Records, n_init: int
     early += float(np.sum(theta[plant.layout.zeros][:1]) - np.sum(held.theta[held.plant.layout.zeros][:1])) / plant.dt
     likely = [log_likelihood(fit.errors, train.mask, 1, train.resolution) for fit in (smooth, held)]
     gain = likely[0] - likely[1]
-    better = block_errors(smooth, valid, n_init).mean() < block_errors(held, valid, n_init).mean()
-    return smooth if early > EARLY and gain > SMOOTH * plant.nu and better else None
+    of_smooth, of_held = (block_errors(fit, valid, n_init, train).mean() for fit in (smooth, held))
+    return smooth if early > EARLY and gain > SMOOTH * plant.nu and of_smooth < of_held else None
 
 
 def _with_taps(held: Estimate, train: Records, noise: Noise, taps: tuple[int, ...]) -> Estimate:

@@ -34,9 +34,9 @@ def fit_plain(
     """
     problem = _plain_problem(plant, records)
     begun = []
-    # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it. Zeros that are known of
-    # a smaller model move along.
-    with_zeros = smaller if plant.zeros and smaller is not None and smaller.plant.zeros else None
+    # Given the poles, all but the zeros and the velocity's scale is linear: one step solves it. Where each further pole
+    # comes with a zero, the zeros move along.
+    with_zeros = smaller if smaller is not None and _gains_zeros(smaller.plant, plant) else None
     linear = np.zeros(plant.size, dtype=bool)
     linear[plant.layout.gains] = linear[plant.layout.offset] = True
     linear[plant.layout.zeros] = with_zeros is not None
@@ -79,6 +79,10 @@ def _finished(problem: Problem, tried: list[Estimate], max_steps: int) -> Estima
     best = min(fits, key=lambda fit: fit.squares)
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
     return descend(Problem(plant, records, noise), best.theta, best.local)
+
+
+def _gains_zeros(smaller: Plant, plant: Plant) -> bool:
+    return 0 < plant.order - smaller.order == plant.zeros - smaller.zeros
 
 
 def _zeros_at_new_poles(plant: Plant, theta: np.ndarray, smaller: Estimate) -> np.ndarray:

@@ -41,6 +41,11 @@ def test_of_white_errors_the_interval_is_as_wide_as_theory_says():
     assert np.mean(widths) == pytest.approx(2.13 * np.sqrt(4 / 4000), rel=0.15)  # Student's t with 15 degrees
 
 
+def test_a_record_without_a_reading_changes_no_correlation():
+    error, lengths = np.convolve(np.random.default_rng(2).standard_normal(90), np.ones(5), "same"), [40, 50]
+    assert correlation_time(error, [0, 40, 0, 50], 1) == correlation_time(error, lengths, 1)
+
+
 def test_the_memory_of_errors_widens_the_interval():
     rng = np.random.default_rng(1)
 

@@ -15,6 +15,6 @@ def test_an_odd_set_ends_in_an_answer_or_a_sentence(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", (2, 4, *range(5000, 5100)))
+@pytest.mark.parametrize("seed", (2, 4, 7183, 7451, 7596, 7659, *range(5000, 5096)))
 def test_a_hundred_odd_sets_end_in_an_answer_or_a_sentence(seed):
     assert ODD["outcome"](seed)

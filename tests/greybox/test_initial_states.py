@@ -179,6 +179,13 @@ def test_a_record_too_short_for_several_runs_has_no_usual_start():
 
 
 @pytest.mark.filterwarnings("error")
+def test_a_record_of_one_reading_has_no_usual_start():
+    known, data, _ = axis(np.random.default_rng(5), np.zeros((1, 2)))
+    one = replace(data, mask=np.arange(data.mask.shape[1])[None] == 3)
+    assert usual_start(known, one, white_noise(0.1), 10) is None
+
+
+@pytest.mark.filterwarnings("error")
 def test_where_every_reading_of_the_start_is_left_out_the_simulation_begins_at_the_first():
     known, data, _ = made_of("velocity", samples=1)
     unread = replace(data, mask=np.zeros_like(data.mask))

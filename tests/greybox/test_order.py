@@ -51,6 +51,27 @@ def test_a_slow_pole_beside_its_zero_is_found_behind_a_fast_plant(seed):
     assert plain_errors(search).std() < 0.012 * train[0].y.std()
 
 
+@pytest.mark.parametrize("slow", [0.05, 0.2])
+def test_a_heater_with_a_fast_and_a_slow_lag_side_by_side_gets_both(slow):
+    plant = Plant(np.diag([-2.0, -slow]), np.array([[1.0], [0.5 * slow]]), np.array([[1.0, 1.0]]))
+    train, valid = measured(plant, noise=0.01, shape=(2, 400), hold=100)
+    search = plain_search(train, valid, "other")
+    assert order_of(search) == 2
+    assert plain_errors(search).std() < 0.015 * train[0].y.std()
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_an_order_is_not_blamed_for_what_ten_noisy_samples_tell_of_a_slow_state(seed):
+    swinging = np.array([[0.0, 1.0], [-0.01, -0.05]])
+    a = np.zeros((3, 3))
+    a[:2, :2], a[2, 2] = swinging, -0.7
+    plant = Plant(a, np.array([[0.0], [0.01], [0.7]]), np.array([[1.0, 0.0, 1.0]]))
+    train, valid = measured(plant, seed, shape=(2, 800), hold=30)
+    search = plain_search(train, valid, "other")
+    assert order_of(search) >= 3
+    assert plain_errors(search).std() < 0.03 * train[0].y.std()
+
+
 def test_three_resonances_of_a_structure_are_found_together():
     # Accelerations and flexible arms look so; one resonance more explains little as long as others are missing.
     a, b, c = np.zeros((6, 6)), np.zeros((6, 1)), np.zeros((1, 6))

@@ -1,0 +1,17 @@
+"""Random linear plants are simulated to within their noise, and nothing is named."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from simgap.diagnosis.diagnose import diagnose
+
+STUDY = runpy.run_path(str(Path(__file__).with_name("linear_plants.py")))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_of_a_linear_plant_nothing_is_named(seed):
+    found = diagnose(STUDY["data_set"](seed)).findings
+    assert not found.causes
