@@ -134,7 +134,7 @@ def test_a_delay_does_not_buy_a_higher_order(seed):
 
 @pytest.mark.slow
 def test_a_saturation_that_makes_lags_look_unneeded_is_found_with_the_order_that_it_hides():
-    data = field.hide("heat_loop", {"input_saturation": 1.0}, 0.02, 0.8, 301000)
+    data = field.hide("heat_loop", {"input_saturation": 1.0}, 0.02, 0.8, 301001)
     training = data.training
     assert order_of(plain_search(training.train, training.valid, "other")) == 0
     (one,) = identify(training)
