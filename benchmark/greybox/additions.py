@@ -151,25 +151,36 @@ def _extend(
     if term in plant.per_experiment:
         return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
     if term.effect.moves_poles and plant.machine is None:
-        thetas = [theta for theta, _ in started(estimate, plant, term)]
-        fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
-        if term.effect.hides_sign and plant.ny == 1 and not plant.joint:
-            plain = unfolded(baseline.plant, baseline.train)
-            theta, local = plant.carry(plain.plant, plain.theta, plain.local)
-            theta[plant.n_linear :] = thetas[0][plant.n_linear :]
-            return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
-        if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.estimate.squares:
-            return fit
-        # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
-        of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)
-        return min(fit, baseline.fit(plant.terms, [(of_pieces.theta, None)], max_steps), key=lambda fit: fit.squares)
+        return _from_other_poles(baseline, estimate, plant, term, max_steps)
     scored = score_tests(baseline, estimate, [term])[0] if scored is None else scored
-    if not scored or scored[0][0] < WORTH_A_REFIT:
+    if not scored:
         return None
     begun = [(theta, local) for _, theta, local in scored[:STARTS]]
+    if term.effect.may_move_poles and plant.machine is None:
+        thetas = [theta for theta, _ in begun + started(estimate, plant, term)]  # a score from far poles may mislead
+        afresh = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+        return min(afresh, baseline.fit(plant.terms, begun, max_steps), key=lambda fit: fit.squares)
+    if scored[0][0] < WORTH_A_REFIT:
+        return None
     if plant.machine is not None and (stand_in := plant.machine.stand_in(term)) is not None:
         begun = begun[:1] + _without(stand_in, baseline, estimate, plant, term)
     return baseline.fit(plant.terms, begun, max_steps)
+
+
+def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, max_steps: int) -> Estimate:
+    """Fit an effect without which the linear plant has other poles: they are searched for anew."""
+    thetas = [theta for theta, _ in started(estimate, plant, term)]
+    fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+    if term.effect.hides_sign and plant.ny == 1 and not plant.joint:
+        plain = unfolded(baseline.plant, baseline.train)
+        theta, local = plant.carry(plain.plant, plain.theta, plain.local)
+        theta[plant.n_linear :] = thetas[0][plant.n_linear :]
+        return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
+    if not term.effect.errors_grow or plant.per_experiment or fit.squares < STOOD_IN * baseline.estimate.squares:
+        return fit
+    # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
+    of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)
+    return min(fit, baseline.fit(plant.terms, [(of_pieces.theta, None)], max_steps), key=lambda fit: fit.squares)
 
 
 def _without(

@@ -22,6 +22,8 @@ class ConstantLoad(ForceEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 4"
     role: ClassVar[Role] = "force"
     linear: ClassVar[bool] = True
+    # The mean input that holds it drives an axis away that is modelled without it.
+    may_move_poles: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("offset", "position", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_bias": (
