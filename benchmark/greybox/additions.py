@@ -156,7 +156,7 @@ def _extend(
     if not scored:
         return None
     begun = [(theta, local) for _, theta, local in scored[:STARTS]]
-    if term.effect.may_move_poles and plant.machine is None:
+    if plant.kind in term.effect.may_move_poles_of and plant.machine is None:
         thetas = [theta for theta, _ in begun + started(estimate, plant, term)]  # a score from far poles may mislead
         afresh = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
         return min(afresh, baseline.fit(plant.terms, begun, max_steps), key=lambda fit: fit.squares)

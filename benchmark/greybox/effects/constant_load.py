@@ -23,7 +23,7 @@ class ConstantLoad(ForceEffect):
     role: ClassVar[Role] = "force"
     linear: ClassVar[bool] = True
     # The mean input that holds it drives an axis away that is modelled without it.
-    may_move_poles: ClassVar[bool] = True
+    may_move_poles_of: ClassVar[tuple[str, ...]] = ("position",)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("offset", "position", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_bias": (
