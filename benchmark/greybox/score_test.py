@@ -11,6 +11,7 @@ import numpy as np
 from simgap.cores import on_cores
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
+from simgap.greybox.kernels import SLOTS
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
 from simgap.greybox.terms import Term
@@ -22,7 +23,7 @@ Scored = tuple[float, np.ndarray, np.ndarray]  # what a start would gain, theta,
 
 
 def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
-    """List every effect that applies to the plant, has where to begin and is not among `terms`, on every channel."""
+    """List every effect that applies to the plant, has where to begin and room beside `terms`, on every channel."""
     plant, scales = baseline.plant, baseline.plant.scales
     assert scales is not None
     taken = {term.key for term in terms}
@@ -37,8 +38,15 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
         listed += [
             t for t in on_channels
             if t.key not in taken and effect.applies_to(scales.of(t)) and effect.starts(scales.of(t))
+            and _has_room(t, terms)
         ]  # fmt: skip
     return listed
+
+
+def _has_room(term: Term, terms: Sequence[Term]) -> bool:
+    """Tell whether the compiled loop has room for this force beside those of other terms."""
+    beside = [other for other in terms if other.effect.port == "force" and not term.replaces(other)]
+    return term.effect.port != "force" or len(beside) < SLOTS
 
 
 def score_tests(baseline: Baseline, estimate: Estimate, terms: Sequence[Term]) -> list[list[Scored]]:

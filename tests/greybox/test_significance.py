@@ -155,6 +155,15 @@ def test_what_is_in_the_model_and_what_it_contains_are_no_candidates(search):
     assert "outliers" not in candidates(search)  # left out by other means
 
 
+def test_the_compiled_loop_holds_five_forces_and_a_sixth_is_a_candidate_only_in_the_place_of_one(search):
+    four = ("constant_load", "coulomb_friction", "cubic_stiffness", "hysteresis")
+    assert "quadratic_drag" in candidates(search, *four)
+    with_five = candidates(search, *four, "periodic_disturbance")
+    assert "quadratic_drag" not in with_five
+    assert "stribeck_friction" in with_five  # instead of Coulomb friction
+    assert "input_delay" in with_five
+
+
 def test_of_pieces_of_experiments_nothing_is_said_that_belongs_to_single_experiments(search):
     assert {"sensor_bias", "sensor_drift"} <= set(candidates(search))
     assert not {"sensor_bias", "sensor_drift"} & set(candidates(cut_in_pieces(search)))
