@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from simgap.data import Missing, describe, fetch, load, save
     from simgap.diagnosis.diagnose import diagnose
+    from simgap.experiment_design.choice import choose_record
     from simgap.experiment_design.next_record import next_record
     from simgap.exports.export import Verification, export, verify
     from simgap.protocol import Model
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _HOME = {
     "simgap.data": ("Missing", "describe", "fetch", "load", "save"),
     "simgap.diagnosis.diagnose": ("diagnose",),
+    "simgap.experiment_design.choice": ("choose_record",),
     "simgap.experiment_design.next_record": ("next_record",),
     "simgap.exports.export": ("Verification", "export", "verify"),
     "simgap.running.fitting": ("Fit", "fit"),
@@ -51,8 +53,8 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 __all__ = [
     "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
     "Progress", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "Verification",
-    "check", "describe", "diagnose", "export", "fetch", "fit", "load", "load_model", "load_suite", "next_record",
-    "report", "run", "save", "save_model", "simulate", "verify", "write_figures", "write_site",
+    "check", "choose_record", "describe", "diagnose", "export", "fetch", "fit", "load", "load_model", "load_suite",
+    "next_record", "report", "run", "save", "save_model", "simulate", "verify", "write_figures", "write_site",
 ]  # fmt: skip
 
 

@@ -44,23 +44,39 @@ def next_record(
     travel: Annotated[
         list[str] | None, typer.Option(help="Range of an output: LOW,HIGH or NAME=LOW,HIGH; repeatable.")
     ] = None,
+    among: Annotated[
+        Path | None,
+        typer.Option(help="Choose among records that could be taken: a file, or a folder of files, with the inputs."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the signals that are tried.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write time and inputs of the record into this CSV file.")] = None,
     json: Json = None,
 ) -> None:
-    """Name the models that the records do not tell apart, and design the record that would; limits are as recorded."""
-    from simgap.experiment_design.next_record import next_record
+    """Name the models that the records do not tell apart, and design the record that would; limits are as recorded.
+
+    With --among nothing is designed: records that could be taken are ranked by how well all of them could be simulated
+    afterwards.
+    """
+    from simgap.experiment_design.choice import Choice, choose_record
+    from simgap.experiment_design.next_record import NextRecord, next_record
+    from simgap.records import UnusableInput
     from simgap.reports.rendering import printable
 
     check_writable(out, json)
+    if among is not None and any((input_range, rate, seconds, travel, out)):
+        raise UnusableInput("--among takes the records as they are; leave out limits and --out")
     spans = [parse_limits(name, given or (), 2) for name, given in (("input-range", input_range), ("travel", travel))]
     rates = parse_limits("rate", rate or (), 1)
     dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
-    answer = next_record(dataset, seed=seed, input_range=spans[0], rate=rates, seconds=seconds, travel=spans[1])
+    answer: Choice | NextRecord
+    if among is not None:
+        answer = choose_record(dataset, among)
+    else:
+        answer = next_record(dataset, seed=seed, input_range=spans[0], rate=rates, seconds=seconds, travel=spans[1])
     for line in str(answer).rstrip().splitlines():
         typer.echo(printable(line))
     if json is not None:
         write_json(json, answer.to_json())
-    if out is not None and answer.helps:
+    if out is not None and isinstance(answer, NextRecord) and answer.helps:
         answer.write(out)
         typer.echo(f"\nWritten: {out}")
