@@ -15,6 +15,7 @@ from simgap.cores import all_cores
 from simgap.data.formats.plant_table import with_known
 from simgap.data.kinds import with_kinds
 from simgap.data.loading import read
+from simgap.diagnosis import doubts
 from simgap.experiment_design.candidates import read_candidates
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.model import FittedPlant
@@ -99,8 +100,11 @@ def choose_record(
     dataset = data if isinstance(data, Dataset) else read(data, inputs, outputs, dt).dataset
     dataset = with_known(with_kinds(dataset, kind), known)
     given = candidates if isinstance(candidates, Mapping) else read_candidates(Path(candidates), dataset)
+    training = dataset.training
+    if doubt := doubts.shows_controller((*training.train, *training.valid), dataset.channels):
+        raise UnusableInput(f"{dataset.name}: {doubt}")
     with all_cores():
-        return ranked(dataset, identify(dataset.training), given)
+        return ranked(dataset, identify(training), given)
 
 
 def ranked(dataset: Dataset, identified: Sequence[Identified], candidates: Mapping[str, np.ndarray]) -> Choice:

@@ -15,7 +15,7 @@ from simgap.greybox.identification import identify
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
-from simgap.records import UnusableInput
+from simgap.records import Experiment, UnusableInput
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +128,13 @@ def test_a_bad_candidate_gets_one_sentence(tmp_path, data, identified, files, re
         (tmp_path / name).write_text(text)
     with pytest.raises(UnusableInput, match=reason):
         simgap.choose_record(data, tmp_path)
+
+
+def test_of_records_that_show_the_controller_nothing_is_ranked(data, candidates):
+    train = tuple(Experiment(x.name, 5.0 - x.y, x.y, x.dt) for x in data.training.train)
+    under_control = replace(data, training=replace(data.training, train=train))
+    with pytest.raises(UnusableInput, match="shows the controller"):
+        simgap.choose_record(under_control, candidates)
 
 
 def test_where_nothing_is_new_the_answer_says_so(data, identified):
