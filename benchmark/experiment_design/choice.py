@@ -17,15 +17,14 @@ from simgap.data.kinds import with_kinds
 from simgap.data.loading import read
 from simgap.diagnosis import doubts
 from simgap.experiment_design.candidates import read_candidates
+from simgap.experiment_design.separation import CHUNK
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.model import FittedPlant
-from simgap.greybox.normal_equations import LARGEST_SLOPE
+from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.records import Dataset, Experiment, UnusableInput
 
-CHUNK = 30_000  # samples that are differentiated at once
-SINGULAR = 1e-9  # of the information about an initial state: less is none
 SHOWN = 5
 
 
@@ -110,8 +109,7 @@ def choose_record(
 def ranked(dataset: Dataset, identified: Sequence[Identified], candidates: Mapping[str, np.ndarray]) -> Choice:
     """Rank candidates by a model that is identified already. Raises UnusableInput where none is new."""
     channels, dt = dataset.channels, dataset.training.dt
-    nothing = {name: np.zeros((len(u), len(channels.outputs))) for name, u in candidates.items()}
-    records = [Experiment(name, u, nothing[name], dt) for name, u in candidates.items()]
+    records = [Experiment(name, u, np.zeros((len(u), len(channels.outputs))), dt) for name, u in candidates.items()]
     if wrong := [x.name for x in records if x.u.shape[1] != len(channels.inputs) or len(x) < 2]:
         raise UnusableInput(f"candidate {wrong[0]} has to hold two samples or more of {len(channels.inputs)} inputs")
     at_hand = dataset.training.train + dataset.training.valid
@@ -126,7 +124,7 @@ def ranked(dataset: Dataset, identified: Sequence[Identified], candidates: Mappi
     left = after[order] / before if before > 0 else np.ones(len(new))
     effects = dict.fromkeys(term.effect.title for one in identified for term in one.plant.forecasting.terms)
     names = tuple(records[new[k]].name for k in order)
-    taken = tuple(x.name for k, x in enumerate(records) if k not in set(new))
+    taken = tuple(x.name for x in records if x.name not in names)
     return Choice(dataset.name, tuple(effects), names, tuple(map(float, left)), taken)
 
 
@@ -158,15 +156,15 @@ def _of_each(
     for first in range(0, len(records.u), at_once):
         some = np.arange(first, min(first + at_once, len(records.u)))
         jacobian = Problem(plant, records.only(some), fitted.noise).jacobian(theta, start[some], plant.free)
-        of_theta, of_start = (_numbers(one.swapaxes(0, 1)) for one in (jacobian.theta[plant.free], jacobian.local))
-        of_theta = of_theta * sizes[:, None]
-        squares, across = of_theta @ of_theta.swapaxes(1, 2), of_theta @ of_start.swapaxes(1, 2)
-        inverse = np.linalg.pinv(of_start @ of_start.swapaxes(1, 2), rcond=SINGULAR, hermitian=True)
-        information[some] = squares - across @ inverse @ across.swapaxes(1, 2)
-        slopes[some] = squares / (plant.ny * records.mask[some].sum(axis=1)[:, None, None])
+        of_theta, of_start = _numbers(jacobian.theta[plant.free]) * sizes[:, None, None], _numbers(jacobian.local)
+        for i, k in enumerate(some):
+            of_one = Jacobian(of_theta[:, [i]], of_start[:, [i]])
+            normal = NormalEquations.of(of_one, np.zeros_like(of_one.theta[0]))
+            information[k], *_ = normal.reduced(0.0)
+            slopes[k] = normal.h / (plant.ny * records.mask[k].sum())
     return information, slopes
 
 
-def _numbers(slopes: Float[np.ndarray, "E p M"]) -> Float[np.ndarray, "E p M"]:
+def _numbers(slopes: Float[np.ndarray, "p E M"]) -> Float[np.ndarray, "p E M"]:
     """Take a simulation that grows without bound for one that tells nothing."""
-    return np.where(np.all(np.abs(slopes) < LARGEST_SLOPE, axis=(1, 2), keepdims=True), slopes, 0.0)
+    return np.where(np.all(np.abs(slopes) < LARGEST_SLOPE, axis=(0, 2), keepdims=True), slopes, 0.0)

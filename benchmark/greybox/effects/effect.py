@@ -146,7 +146,7 @@ class Effect(ABC):
     instead_of_order: ClassVar[bool] = False
     # The linear plant fitted without it has other poles, so that a fit with it searches for the poles anew.
     moves_poles: ClassVar[bool] = False
-    may_move_poles_of: ClassVar[tuple[str, ...]] = ()  # such outputs, so that a fit with it begins from others too
+    may_move_poles_of: ClassVar[tuple[str, ...]] = ()  # kinds of output: a fit to one begins from other poles too
     errors_grow: ClassVar[bool] = False  # with time, so that whole records are hard to fit, and short pieces come first
     # A force over position that stands in the place of the linear spring of a plant of second order.
     replaces_spring: ClassVar[bool] = False
