@@ -158,9 +158,9 @@ def _of_each(
         jacobian = Problem(plant, records.only(some), fitted.noise).jacobian(theta, start[some], plant.free)
         of_theta, of_start = _numbers(jacobian.theta[plant.free]) * sizes[:, None, None], _numbers(jacobian.local)
         for i, k in enumerate(some):
-            of_one = Jacobian(of_theta[:, [i]], of_start[:, [i]])
-            normal = NormalEquations.of(of_one, np.zeros_like(of_one.theta[0]))
-            information[k], *_ = normal.reduced(0.0)
+            of_one = Jacobian.of(of_theta[:, [i]], of_start[:, [i]])
+            normal = NormalEquations.of(of_one, np.zeros_like(of_one.slopes[0]))
+            information[k], _ = normal.reduced(0.0)
             slopes[k] = normal.h / (plant.ny * records.mask[k].sum())
     return information, slopes
 

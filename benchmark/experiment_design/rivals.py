@@ -149,7 +149,7 @@ def rival_of(
     fit = descend(problem, estimate.theta, estimate.local, fixed=held, max_steps=STEPS)
     jacobian = problem.jacobian(fit.theta, fit.local, plant.free & ~held)
     nothing = np.zeros((len(fit.local), jacobian.theta.shape[2]))
-    information, *_ = NormalEquations.of(jacobian, nothing).reduced(0.0)
+    information, _ = NormalEquations.of(jacobian, nothing).reduced(0.0)
     return Rival(title, fit, held, np.nan_to_num(information), behind)
 
 

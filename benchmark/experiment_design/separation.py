@@ -61,7 +61,7 @@ def _left(
     jacobian = problem.jacobian(theta, rival.starts(len(u)), plant.free & ~rival.held)
     e = np.where(finite[:, None, None], y - simulated[other], 0.0)
     e = question.noise.whiten(e).reshape(len(u), -1)  # [E, M]
-    slopes = np.concatenate((jacobian.theta, jacobian.local)).swapaxes(0, 1)  # [E, p + q, M]
+    slopes = jacobian.slopes.swapaxes(0, 1)  # [E, p + q, M]
     finite = finite & np.all(np.isfinite(slopes), axis=(1, 2))
     slopes = np.where(finite[:, None, None], slopes, 0.0)
     known = np.zeros((slopes.shape[1],) * 2)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
-from simgap.greybox.kernels import transition
+from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator

@@ -108,7 +108,7 @@ class _OneByOne:
         problem = self.problem.only(groups)
         jacobian = problem.jacobian(self.theta, self.local[groups], np.zeros(len(self.theta), dtype=bool))
         usable = np.max(np.abs(jacobian.local), axis=(0, 2), initial=0.0) < LARGEST_SLOPE  # nor is NaN
-        jacobian = Jacobian(jacobian.theta, np.where(usable[:, None], jacobian.local, 0.0))
+        jacobian = Jacobian(np.where(usable[:, None], jacobian.local, 0.0), 0)
         white = problem.noise.whiten(self.errors[groups]).reshape(len(groups), -1)  # [G, M]
         self._groups, self._normal = groups, NormalEquations.of(jacobian, white)
         return np.where(usable, self._normal.promised_by_each(), np.nan)

@@ -1,4 +1,4 @@
-"""The inner loops of the grey-box simulation, compiled."""
+"""The inner loops of grey boxes with forces, compiled."""
 
 from __future__ import annotations
 
@@ -20,63 +20,6 @@ SLOTS = 5  # force terms that one model may have; the tuple has this length, so 
 FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
 
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
-
-
-@njit(types.void(_matrix, _matrix, _matrix), cache=True, nogil=True)
-def _multiply(a, b, product):
-    for i in range(a.shape[0]):
-        for j in range(b.shape[1]):
-            product[i, j] = 0.0
-            for q in range(a.shape[1]):
-                product[i, j] += a[i, q] * b[q, j]
-
-
-@njit(types.void(_matrix, types.float64, _matrix, _matrix, _matrix), cache=True, nogil=True)
-def transition(a, h, e, g0, g1):  # noqa: PLR0912
-    """Fill exp(A h), integral of exp(A s), and integral of exp(A (h - s)) s / h, over s from 0 to h.
-
-    Taylor series with scaling and doubling: for phi_1(A h) h and phi_2(A h) h (Hochbruck and Ostermann 2010, 2.10).
-    """
-    n = a.shape[0]
-    size = 0.0
-    for i in range(n):
-        for j in range(n):
-            size += abs(a[i, j])
-    halvings = 0
-    while size * h > 0.5:
-        h *= 0.5
-        halvings += 1
-    power, product = np.zeros((n, n)), np.zeros((n, n))
-    for i in range(n):
-        for j in range(n):
-            power[i, j] = e[i, j] = 1.0 if i == j else 0.0
-            g0[i, j], g1[i, j] = h * power[i, j], 0.5 * h * power[i, j]
-    factor = 1.0
-    for k in range(1, 13):
-        _multiply(power, a, product)
-        factor *= k
-        for i in range(n):
-            for j in range(n):
-                power[i, j] = h * product[i, j]
-                e[i, j] += power[i, j] / factor
-                g0[i, j] += h * power[i, j] / (factor * (k + 1))
-                g1[i, j] += h * power[i, j] / (factor * (k + 1) * (k + 2))
-    for _ in range(halvings):
-        # Over two steps: e e; the constant enters twice; the ramp is half a ramp, then half a ramp on a half.
-        _multiply(e, g1, product)
-        for i in range(n):
-            for j in range(n):
-                g1[i, j] = 0.5 * (product[i, j] + g1[i, j] + g0[i, j])
-        _multiply(e, g0, product)
-        for i in range(n):
-            for j in range(n):
-                g0[i, j] += product[i, j]
-        _multiply(e, e, product)
-        for i in range(n):
-            for j in range(n):
-                e[i, j] = product[i, j]
-
-
 _loop = types.void(
     _cube, _cube, _cube, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
     types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, types.float64[::1],

@@ -59,7 +59,7 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
     runs = simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))
-    responses = np.stack([y[..., 0] for y in runs], axis=2)  # [E, T, f]
+    responses = np.moveaxis(runs[..., 0], 0, 2)  # [E, T, f]
     jacobian = problem.jacobian(estimate.theta, estimate.local, plant.free)
     share = _predicted(estimate, records, responses, jacobian)
     mask = records.mask

@@ -7,23 +7,36 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.elimination_kernels import damped_step, eliminate, solve_blocks
+
 LARGEST_SLOPE = 1e100  # its square is still a number
 
 
 @dataclass(frozen=True, eq=False)
 class Jacobian:
-    """d(simulation)/d(parameter), whitened: of theta [p, E, M], and of the numbers of each experiment [q, E, M]."""
+    """d(simulation)/d(parameter), whitened: of theta [p, E, M], then of the numbers of each experiment [q, E, M]."""
 
-    theta: Float[np.ndarray, "p E M"]
-    local: Float[np.ndarray, "q E M"]
+    slopes: Float[np.ndarray, "p+q E M"]
+    p: int
+
+    @classmethod
+    def of(cls, theta: Float[np.ndarray, "p E M"], local: Float[np.ndarray, "q E M"]) -> Jacobian:
+        return cls(np.concatenate((theta, local)), len(theta))
+
+    @property
+    def theta(self) -> Float[np.ndarray, "p E M"]:
+        """The slopes of theta."""
+        return self.slopes[: self.p]
+
+    @property
+    def local(self) -> Float[np.ndarray, "q E M"]:
+        """The slopes of the numbers of each experiment."""
+        return self.slopes[self.p :]
 
     @property
     def finite(self) -> bool:
         """Whether all slopes are numbers, and their squares too."""
-        return bool(
-            np.max(np.abs(self.theta), initial=0.0) < LARGEST_SLOPE
-            and np.max(np.abs(self.local), initial=0.0) < LARGEST_SLOPE
-        )
+        return bool(np.max(np.abs(self.slopes), initial=0.0) < LARGEST_SLOPE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +51,17 @@ class NormalEquations:
 
     @classmethod
     def of(cls, jacobian: Jacobian, white: np.ndarray) -> NormalEquations:
-        j, k = jacobian.theta.swapaxes(0, 1), jacobian.local.swapaxes(0, 1)  # [E, p, M], [E, q, M]
-        jt, kt = j.swapaxes(1, 2), k.swapaxes(1, 2)
-        e = white[:, :, None]
-        return cls((j @ jt).sum(0), (j @ e).sum(0)[:, 0], j @ kt, k @ kt, (k @ e)[:, :, 0])
+        p, slopes = jacobian.p, jacobian.slopes.swapaxes(0, 1)  # [E, p + q, M]
+        h = slopes @ slopes.swapaxes(1, 2)
+        nothing = np.empty(0)
+        equations = cls(h[:, :p, :p].sum(0), nothing, h[:, :p, p:].copy(), h[:, p:, p:].copy(), nothing)
+        return equations.with_errors(jacobian, white)
+
+    def with_errors(self, jacobian: Jacobian, white: Float[np.ndarray, "E M"]) -> NormalEquations:
+        """Return the equations of the same slopes for other errors."""
+        gradient = (jacobian.slopes.swapaxes(0, 1) @ white[:, :, None])[:, :, 0]  # [E, p + q]
+        p = jacobian.p
+        return replace(self, gradient=gradient[:, :p].sum(0), block_gradient=gradient[:, p:].copy())
 
     def only(self, experiments: np.ndarray) -> NormalEquations:
         """Return the equations of some experiments, theta being known."""
@@ -52,39 +72,27 @@ class NormalEquations:
 
     def steps_of_each(self, damping: float | np.ndarray) -> Float[np.ndarray, "E q"]:
         """Compute the damped steps of the per-experiment numbers, theta being known."""
-        return self._solved(self.block_gradient[:, :, None], damping)[:, :, 0]
+        steps = self.block_gradient[:, :, None].copy()
+        solve_blocks(self.blocks, steps, np.full(len(steps), damping))
+        return steps[:, :, 0]
 
     def promised_by_each(self) -> Float[np.ndarray, " E"]:
         """Compute the gain that a whole step of each experiment promises, theta being known."""
         return np.sum(self.steps_of_each(1e-9) * self.block_gradient, axis=1)
 
-    def _solved(self, right: Float[np.ndarray, "E q k"], damping: float | np.ndarray) -> Float[np.ndarray, "E q k"]:
-        """Solve the damped blocks, each number in units of its own slope: then none of them is singular."""
-        i = np.arange(self.blocks.shape[1])
-        scale = scales_of(self.blocks[:, i, i])[:, :, None]  # [E, q, 1]
-        blocks = self.blocks / scale / scale.swapaxes(1, 2)
-        blocks[:, i, i] = 1 + np.reshape(damping, (-1, 1)) + 1e-12
-        return np.linalg.solve(blocks, right / scale) / scale
-
-    def reduced(self, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Eliminate the per-experiment numbers: J' J of theta, and what turns steps of theta into theirs."""
-        weights = self._solved(self.cross.swapaxes(1, 2), damping)  # [E, q, p]
-        starts = self.steps_of_each(damping)  # [E, q]
-        h = self.h - (self.cross @ weights).sum(0)
-        return h, weights, starts
+    def reduced(self, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """Eliminate the per-experiment numbers: J' J of theta, and what turns steps of theta into theirs [E, q, p]."""
+        h, gradient = np.empty_like(self.h), np.empty_like(self.gradient)
+        solved = np.empty((*self.block_gradient.shape, len(h) + 1))
+        eliminate(self.h, self.gradient, self.cross, self.blocks, self.block_gradient, damping, h, gradient, solved)
+        return h, solved[:, :, :-1]
 
     def step(self, inside: np.ndarray, damping: float) -> tuple[tuple[np.ndarray, np.ndarray], float]:
         """Compute the damped step of theta and of the per-experiment numbers, and the gain it promises."""
-        h, weights, starts = self.reduced(damping)
-        gradient = self.gradient - (self.cross @ starts[:, :, None]).sum(0)[:, 0]
-        scale = scales_of(np.diag(self.h))
-        matrix = (h / scale / scale[:, None])[inside][:, inside]
-        matrix.flat[:: len(matrix) + 1] += damping + 1e-11
-        step = np.zeros(len(gradient))
-        if inside.any():
-            step[inside] = np.linalg.lstsq(matrix, (gradient / scale)[inside], rcond=1e-13)[0] / scale[inside]
-        local = starts - weights @ step
-        promised = float(step @ gradient + np.sum(starts * self.block_gradient))
+        step, local = np.empty_like(self.gradient), np.empty_like(self.block_gradient)
+        promised = damped_step(
+            self.h, self.gradient, self.cross, self.blocks, self.block_gradient, inside, damping, step, local
+        )
         return (step, local), promised
 
 

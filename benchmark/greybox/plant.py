@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float
 from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
 from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, Start
+from simgap.greybox.linear_kernels import companion
 from simgap.greybox.terms import PlantScales, Term
 from simgap.records import Kind
 
@@ -275,11 +276,8 @@ class Plant:
             return two_masses.matrix(sections)
         if self.cascade:
             return np.diag(-sections) + np.diag(sections[:-1], -1)
-        polynomial = np.array([1.0, *sections[:2]])
-        for first in range(2, n, 2):
-            polynomial = np.convolve(polynomial, [1.0, *sections[first : first + 2]])
-        a = np.diag(np.ones(n - 1), 1)
-        a[-1] = -polynomial[:0:-1]
+        a = np.empty((n, n))
+        companion(sections, a)
         return a
 
     def reading(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "ny n"]:

@@ -127,42 +127,43 @@ class Problem:
 
     def jacobian(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Jacobian:
         """Differentiate the simulation by forward differences, for the parameters `which` of theta."""
-        plant, which = self.plant, np.flatnonzero(which)
-        sizes, high = self.sizes(theta), plant.high
-        steps = [DIFFERENCE * sizes[i] * (1 if theta[i] + DIFFERENCE * sizes[i] <= high[i] else -1) for i in which]
-        powers = [0 if plant.cascade else i % 2 if plant.joint else i for i in range(plant.order)]
-        starts = [np.array(DIFFERENCE * self._sizes[0] * plant.dt**-power) for power in powers]
-        # Towards the middle: on its other side a start may be out of reach, and change nothing.
-        towards = np.where(local[:, plant.order : plant.n_start] > 0, -DIFFERENCE, DIFFERENCE)  # [E, m]
-        starts += list(towards.T)
-        thetas = np.repeat(theta[None], 1 + len(steps) + len(starts), axis=0)
+        which, own = np.flatnonzero(which), np.arange(self.plant.n_local)
+        steps = np.concatenate((self._steps(theta, len(local), which), self._steps_of_own(local)))  # [S, E]
+        thetas = np.repeat(theta[None], 1 + len(steps), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
-        for row, (i, step) in enumerate(zip(which, steps, strict=True), start=1):
-            thetas[row, i] += step
-        for i, step in enumerate(starts):
-            locals_[1 + len(steps) + i, :, i] += step
-        here, *there = self.simulator.run_many(thetas, locals_)
-        m = here.shape[1] * here.shape[2]
-        soft = self.records.soft
-        weights = softness(self.records.y - here, soft) if soft else None
+        thetas[1 + np.arange(len(which)), which] += steps[: len(which), 0]
+        locals_[1 + len(which) + own, :, own] += steps[len(which) :]
+        here, *_ = y = self.simulator.run_many(thetas, locals_)  # [1 + S, E, T, ny]
+        with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
+            change = y[1:] - here
+            change /= steps[:, :, None, None]
+            change = self._where_measured(change)
+            if self.records.soft:
+                change *= softness(self.records.y - here, self.records.soft)
+            slopes = self.noise.whiten(change).reshape(*steps.shape, here[0].size)
+        if len(which) < len(theta):
+            of_all = np.zeros((len(theta) + len(own), *slopes.shape[1:]))
+            of_all[np.concatenate((which, len(theta) + own))] = slopes
+            slopes = of_all
+        return Jacobian(slopes, len(theta))
 
-        def slope(moved: np.ndarray, step: float | np.ndarray) -> np.ndarray:
-            with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
-                change = self._where_measured((moved - here) / step)
-                return self.noise.whiten(change if weights is None else change * weights).reshape(len(here), m)
+    def _steps(self, theta: np.ndarray, experiments: int, which: np.ndarray) -> Float[np.ndarray, "P E"]:
+        """Choose the steps of some of theta, downwards at an upper bound."""
+        steps = DIFFERENCE * self.sizes(theta)[which]
+        steps[theta[which] + steps > self.plant.high[which]] *= -1
+        return np.repeat(steps[:, None], experiments, axis=1)
 
-        of_theta = np.zeros((len(theta), len(here), m))
-        for i, moved, step in zip(which, there[: len(steps)], steps, strict=True):
-            of_theta[i] = slope(moved, step)
-        of_local = np.zeros((plant.n_local, len(here), m))
-        for i, (moved, step) in enumerate(zip(there[len(steps) :], starts, strict=True)):
-            of_local[i] = slope(moved, step.reshape(-1, 1, 1))
+    def _steps_of_own(self, local: np.ndarray) -> Float[np.ndarray, "q E"]:
+        """Choose the steps of the numbers of each experiment: initial states, memories of terms, terms of its own."""
+        plant, steps = self.plant, np.empty(local.T.shape)
+        powers = [0 if plant.cascade else i % 2 if plant.joint else i for i in range(plant.order)]
+        steps[: plant.order] = (DIFFERENCE * self._sizes[0] * plant.dt ** -np.array(powers, dtype=float))[:, None]
+        # Towards the middle: on its other side a memory may be out of reach, and change nothing.
+        memories = slice(plant.order, plant.n_start)
+        steps[memories] = np.where(local[:, memories] > 0, -DIFFERENCE, DIFFERENCE).T
         for i, term in enumerate(plant.per_experiment, start=plant.n_start):
-            step = self._sizes[term.channel] / self.records.duration
-            moved = local.copy()
-            moved[:, i] += step
-            of_local[i] = slope(self.simulator.run(theta, moved), step)
-        return Jacobian(of_theta, of_local)
+            steps[i] = self._sizes[term.channel] / self.records.duration
+        return steps
 
     def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:
         """Return the size of each parameter, to which the step of its finite difference is proportional.

@@ -52,10 +52,13 @@ def _has_room(term: Term, terms: Sequence[Term]) -> bool:
 def score_tests(baseline: Baseline, estimate: Estimate, terms: Sequence[Term]) -> list[list[Scored]]:
     """Test each of several effects beside a fitted model, as `score` does."""
     jacobian = baseline.problem(estimate.plant).jacobian(estimate.theta, estimate.local, estimate.plant.free)
-    return on_cores(partial(score, baseline, estimate, jacobian), terms)
+    white = baseline.noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
+    return on_cores(partial(score, baseline, estimate, jacobian, NormalEquations.of(jacobian, white)), terms)
 
 
-def score(baseline: Baseline, estimate: Estimate, jacobian: Jacobian, term: Term) -> list[Scored]:
+def score(
+    baseline: Baseline, estimate: Estimate, jacobian: Jacobian, normal: NormalEquations, term: Term
+) -> list[Scored]:
     """Test each start of an effect: the log-likelihood it would gain, to first order, with theta and local numbers.
 
         d = simulation with the effect - simulation without, made orthogonal to the model's own slopes
@@ -85,7 +88,7 @@ def score(baseline: Baseline, estimate: Estimate, jacobian: Jacobian, term: Term
         if not (jacobian.finite and 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE):
             scored.append((0.0, theta, local))
             continue
-        _, projected = NormalEquations.of(jacobian, d).step(estimate.plant.free, 1e-9)
+        _, projected = normal.with_errors(jacobian, d).step(estimate.plant.free, 1e-9)
         dd = float(np.vdot(d, d))
         rest = max(dd - projected, 1e-6 * dd)
         along = float(np.vdot(d, e))

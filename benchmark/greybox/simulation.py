@@ -17,8 +17,8 @@ from simgap.greybox.kernels import (
     follow_motion_directly,
     run_body_directly,
     run_tanks_directly,
-    transition,
 )
+from simgap.greybox.linear_kernels import read, run_linear, transition
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine_directly
 from simgap.greybox.plant import Plant
@@ -82,7 +82,7 @@ class Simulator:
         for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, on_inputs)):
             self._of_drive[part] = True
         self._drives: dict[bytes, np.ndarray] = {}
-        self._known: dict[bytes, np.ndarray] = {}  # states of what was simulated last
+        self._known = b"", np.empty((0, *u.shape[:2], 1))  # the states [1, E, T, n] of what was simulated last
         forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
@@ -122,9 +122,14 @@ class Simulator:
             transition(a, self.h, e[i], g0[i], g1[i])
             rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
         states = np.empty((s, experiments, samples, n))
-        run, entry = (run_tanks_directly, 0) if plant.cascade else (run_body_directly, ENTRY if plant.joint else n - 1)
+        entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
+        starts = np.ascontiguousarray(starts)
+        if not self._until[-1]:
+            run_linear(e, g0, entry, drives, starts, self.substeps, states)
+            return states
+        run = run_tanks_directly if plant.cascade else run_body_directly
         run(
-            e, g0, g1, rates, entry, drives, np.ascontiguousarray(starts), self.substeps, self.h, self._terms,
+            e, g0, g1, rates, entry, drives, starts, self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
@@ -252,15 +257,37 @@ class Simulator:
 
     def run_many(
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
-    ) -> list[Float[np.ndarray, "E T ny"]]:
+    ) -> Float[np.ndarray, "S E T ny"]:
         """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
-        starts = locals_[:, :, : self.plant.n_start]
-        keys = [t[self.plant.moves_states].tobytes() + z.tobytes() for t, z in zip(thetas, starts, strict=True)]
-        new = {key: i for i, key in enumerate(keys) if key not in self._known}
+        plant = self.plant
+        moving, starts = thetas[:, plant.moves_states], locals_[:, :, : plant.n_start]
+        keys = [of_run.tobytes() + start.tobytes() for of_run, start in zip(moving, starts, strict=True)]
+        known, states_known = self._known
+        row_of = {key: row for row, key in enumerate(keys) if key != known}
+        rows = list(row_of.values())
+        states = self.states(thetas[rows], starts[rows]) if rows else states_known
+        place = {known: -1} | {key: i for i, key in enumerate(row_of)}
+        which = np.array([place[key] for key in keys])
+        y = np.empty((len(keys), *self.shape[:2], plant.ny))
+        readings = np.stack([plant.reading(theta) for theta in thetas])
         with np.errstate(over="ignore", invalid="ignore"):
-            if new:
-                rows = list(new.values())
-                self._known |= zip(new, self.states(thetas[rows], starts[rows]), strict=True)
-            y = [self.outputs(t, q, self._known[key]) for t, q, key in zip(thetas, locals_, keys, strict=True)]
-        self._known = {keys[0]: self._known[keys[0]]}  # the Jacobian is asked for where a fit has just been
+            read(states_known, states, which, readings, y)
+            for of_run in zip(thetas, locals_, y, strict=True):
+                self._pass_sensors(*of_run)
+        # The Jacobian is asked for where a fit has just been.
+        self._known = keys[0], states[which[0], None] if which[0] >= 0 else states_known
         return y
+
+    def _pass_sensors(
+        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], y: Float[np.ndarray, "E T ny"]
+    ) -> None:
+        """Let the sensors' effects act on the outputs, in place."""
+        plant = self.plant
+        for channel in range(plant.ny):
+            for term in plant.on("output", channel):
+                if (power := term.effect.time_power) is not None:
+                    value = local[:, plant.local_index(term)]
+                    y[:, :, channel] += value[:, None] * self.t**power
+                else:
+                    assert isinstance(term.effect, OutputEffect)
+                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[plant.part_of(term)], self.t)

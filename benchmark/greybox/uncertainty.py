@@ -41,7 +41,7 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     if not jacobian.finite:
         return None
     normal = NormalEquations.of(jacobian, white)
-    h, weights, _ = normal.reduced(0.0)
+    h, weights = normal.reduced(0.0)
     # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
     own = jacobian.theta - np.einsum("eqp,qem->pem", weights, jacobian.local)
     per_record = max(1, -(-BLOCKS // len(white)))

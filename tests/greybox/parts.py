@@ -138,7 +138,7 @@ def jacobian(made, data, own, weighing):
 
 def step(of_theta, of_own, errors, inside, damping):
     """The step of theta [p] and of the own numbers [E, q], and the fall of the squares that it promises."""
-    return NormalEquations.of(Jacobian(of_theta, of_own), errors).step(inside, damping)
+    return NormalEquations.of(Jacobian.of(of_theta, of_own), errors).step(inside, damping)
 
 
 def fitted(made, data, weighing, fixed=None):

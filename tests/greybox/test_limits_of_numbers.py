@@ -59,7 +59,7 @@ def test_numbers_that_move_nothing_stay_where_they_are():
     theta[0] = 1.0
     local = np.zeros((2, 2, 5))
     local[0, 0] = np.arange(5.0)
-    equations = NormalEquations.of(Jacobian(theta, local), np.ones((2, 5)))
+    equations = NormalEquations.of(Jacobian.of(theta, local), np.ones((2, 5)))
     (step, own), promised = equations.step(np.ones(2, dtype=bool), 1e-9)
     assert step[1] == 0 and not own[1].any() and not own[:, 1].any()
     assert promised == pytest.approx(10.0)  # the first number of theta is all the error
@@ -69,9 +69,9 @@ def test_numbers_that_move_nothing_stay_where_they_are():
 def test_a_step_is_the_same_in_every_unit(unit):
     rng = np.random.default_rng(4)
     theta, local, white = (rng.standard_normal(shape) for shape in ((2, 3, 20), (2, 3, 20), (3, 20)))
-    (step, own), _ = NormalEquations.of(Jacobian(theta, local), white).step(np.ones(2, dtype=bool), 1e-3)
+    (step, own), _ = NormalEquations.of(Jacobian.of(theta, local), white).step(np.ones(2, dtype=bool), 1e-3)
     units = np.array([unit, 1.0])
-    scaled = Jacobian(theta * units[:, None, None], local * units[::-1, None, None])
+    scaled = Jacobian.of(theta * units[:, None, None], local * units[::-1, None, None])
     (again, own_again), _ = NormalEquations.of(scaled, white).step(np.ones(2, dtype=bool), 1e-3)
     np.testing.assert_allclose(again * units, step, rtol=1e-9)
     np.testing.assert_allclose(own_again * units[::-1], own, rtol=1e-9)
