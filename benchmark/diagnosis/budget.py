@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
 
+from simgap.cores import on_cores
 from simgap.diagnosis import promises
 from simgap.diagnosis.gains import SMALLEST_ERROR, free_run
 from simgap.diagnosis.promises import Promise
@@ -19,6 +21,7 @@ from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.rest import learn
 from simgap.greybox.samples import sizes_of
+from simgap.greybox.terms import Term
 from simgap.metrics import is_finite
 from simgap.records import Dataset
 
@@ -103,12 +106,15 @@ def _absolute(plant: Evidence, dataset: Dataset, runs: Sequence[Runs]) -> dict[i
     return {output: dict(zip(["", *_keys(plant)], errors, strict=True))}
 
 
-def _with_ever_more(plant: Evidence) -> Iterator[FittedPlant]:
-    """Yield the plant with its first cause, with the first two, and so on; bad readings come first."""
+def _with_ever_more(plant: Evidence) -> list[FittedPlant]:
+    """List the plant with its first cause, with the first two, and so on; bad readings come first."""
     outliers = len(plant.selection.baseline.outliers)
-    yield from [plant.identified.plain] * outliers
-    for count in range(1, len(plant.terms) + 1):
-        yield promises.only(plant, plant.terms[:count]).identified.plant
+    causes = [plant.terms[:count] for count in range(1, len(plant.terms) + 1)]
+    return [plant.identified.plain] * outliers + on_cores(partial(_only, plant), causes)
+
+
+def _only(plant: Evidence, terms: Sequence[Term]) -> FittedPlant:
+    return promises.only(plant, terms).identified.plant
 
 
 def _mse(dataset: Dataset, runs: Runs, outputs: Sequence[int] | slice = slice(None)) -> Float[np.ndarray, " ny"]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,6 +44,13 @@ def block_errors(fit: Estimate, valid: Records, n_init: int, train: Records | No
     squares = np.where(valid.mask[:, :, None], errors**2 + RESOLUTION**2, 0.0)
     blocks = np.array_split(squares, min(max(2, BLOCKS // len(squares)), squares.shape[1]), axis=1)
     return np.concatenate([block.mean(axis=(1, 2)) for block in blocks])
+
+
+def as_good_as_best(errors: Sequence[np.ndarray]) -> int:
+    """Return the first of several models whose mean error is within a standard error of the lowest, block by block."""
+    best = min(errors, key=np.mean)
+    worse = [one - best for one in errors]
+    return next(i for i, gap in enumerate(worse) if gap.mean() <= gap.std() / math.sqrt(len(gap)))
 
 
 def in_most(gain: np.ndarray) -> bool:

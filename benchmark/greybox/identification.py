@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from simgap.greybox.inner_filter import with_inner_filter
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.linear_rival import LinearRival, linear_rival
@@ -59,6 +60,7 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
         if effects and channels.plant is None:
             stage("Comparing with linear models of other orders")
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
+            selection = with_inner_filter(selection, of_kind)
             linear = linear_rival(data, of_kind, selection)
         best = (linear.baseline.estimate, linear.baseline) if linear else (selection.trial.estimate, selection.baseline)
         identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))

@@ -12,7 +12,7 @@ from simgap.greybox.additions import add
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.held_out import block_errors, errors_on, in_most
+from simgap.greybox.held_out import as_good_as_best, block_errors, errors_on, in_most
 from simgap.greybox.noise import Noise, log_likelihood, schwarz_order, white, white_as_large_as
 from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
@@ -148,14 +148,8 @@ def plain_models(
             tried += here
         if rounds_in_vain == 2:
             break
-    best = min((squares for _, squares in tried), key=np.mean)
-    chosen = []
-    for fit, squares in tried:  # from the simplest on
-        chosen.append(fit)
-        worse = squares - best
-        if worse.mean() <= worse.std() / math.sqrt(len(worse)):
-            break
-    return chosen, tuple(fit for fit, _ in tried)
+    fits = tuple(fit for fit, _ in tried)  # from the simplest on
+    return list(fits[: 1 + as_good_as_best([squares for _, squares in tried])]), fits
 
 
 def _of_order(

@@ -35,7 +35,7 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
         if larger is None:
             break
         other = select(larger)
-        if _is_better_order(other, selection):
+        if is_better_order(other, selection):
             selection, more = other, 1
         elif more == 1 and _may_lose_sign(selection.baseline):
             more = 2  # a resonance takes two
@@ -77,7 +77,7 @@ def of_higher_order(selection: Selection, more: int, channels: Channels) -> Base
     return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
 
 
-def _is_better_order(other: Selection, before: Selection) -> bool:
+def is_better_order(other: Selection, before: Selection) -> bool:
     """Tell whether effects on a plant of higher order err less on most held-out blocks, or in the mean at no cost."""
     was, now = (block_errors(of.trial.estimate, of.baseline.valid, of.baseline.n_init) for of in (before, other))
     as_few = other.trial.cost <= before.trial.cost and now.mean() < was.mean()

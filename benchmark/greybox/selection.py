@@ -90,6 +90,13 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
+def select_around(baseline: Baseline, estimate: Estimate) -> Selection:
+    """Choose further effects beside those of a fitted model; superfluous ones are taken out."""
+    search = _Search(baseline)
+    trial = search.backward(search.forward(assess(baseline, estimate, 0)))
+    return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
+
+
 @dataclass
 class _Search:
     """A selection under way. The noise order belongs to the best model so far; every round chooses it anew."""

@@ -59,6 +59,8 @@ class Encoder:
         name = getattr(kind, "name", "")
         if isinstance(name, str) and name in EFFECTS and EFFECTS[name] is kind:
             return {"effect": name}
+        if isinstance(name, str) and name in EFFECTS and EFFECTS[name].refined is kind:
+            return {"refined": name}
         if callable(getattr(kind, "simulate", None)):
             return self.model(value, at)
         raise _refused(at, f"a {kind.__qualname__}")
@@ -113,6 +115,8 @@ def _decoded(text: Any, arrays: dict[str, np.ndarray], parts: dict[str, type]) -
             value = dict(zip(each(keys), each(values), strict=True))
         case {"effect": name}:
             value = EFFECTS[str(name)]()
+        case {"refined": name}:
+            value = EFFECTS[str(name)].refined()
         case {"part": name, "state": state}:
             value = build_record(parts[name], dict(zip(state, each(list(state.values())), strict=True)))
         case _:

@@ -123,6 +123,8 @@ class Effect(ABC):
     # Simpler effects that this one contains as a special case, and which of its parameters are theirs; it takes their
     # place in a model.
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {}
+    # The same cause as a law with more numbers, of the same name, tried where this one was found.
+    refined: ClassVar[type[Effect] | None] = None
     # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
     memory: ClassVar[int] = 0
     # What the simulation does with the value of a force term.

@@ -9,7 +9,8 @@ import numpy as np
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.actuator_lag import lagged, lagged_step
-from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.filtered_saturation import FilteredSaturation
 from simgap.registry import EFFECTS
 
 
@@ -32,6 +33,7 @@ class InnerSaturation(InputEffect):
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     substeps: ClassVar[int] = 4
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"actuator_lag": (0,), "input_saturation": (2,)}
+    refined: ClassVar[type[Effect] | None] = FilteredSaturation
     shows_in: ClassVar[tuple[ViewName, ...]] = ("amplitude", "input", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
         "actuator_lag": "apply steps of several sizes: behind a lag alone all of them end in proportion to the input",

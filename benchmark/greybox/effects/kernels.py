@@ -69,3 +69,39 @@ def limited_rate(u, up, down):
                 mean[e, k] = u[e, k] - (0.5 * way * abs(way) / speed if speed > 0.0 else 0.0)
                 at = u[e, k]
     return mean
+
+
+@njit(cache=True, nogil=True)
+def second_order(u, time_constant, damping, h):
+    """Compute the mean over each step of h seconds of what u [E, K] is behind a filter of second order, settled first.
+
+    T^2 x'' + 2 D T x' + x = u, solved exactly for u constant over a step; integrated over it, x less u is
+    -(T^2 x' + 2 D T x), of which only the change counts.
+    """
+    e11, e12, e21, e22 = swing(time_constant, damping, h)
+    mean = np.empty_like(u)
+    for e in range(len(u)):
+        x, v = u[e, 0], 0.0
+        for k in range(u.shape[1]):
+            away = x - u[e, k]
+            later, faster = u[e, k] + e11 * away + e12 * v, e21 * away + e22 * v
+            change = time_constant * (time_constant * (faster - v) + 2.0 * damping * (later - x))
+            mean[e, k] = u[e, k] - change / h
+            x, v = later, faster
+    return mean
+
+
+@njit(cache=True, nogil=True)
+def swing(time_constant, damping, h):
+    """Return exp(A h), row by row, of T^2 x'' + 2 D T x' + x = 0 with the states x and x'."""
+    decay, square = damping * h / time_constant, (damping * damping - 1.0) * (h / time_constant) ** 2
+    if square > 1e-12:
+        root = math.sqrt(square)
+        fast, slow = math.exp(-decay - root), math.exp(root - decay)
+        c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+    elif square < -1e-12:
+        root = math.sqrt(-square)
+        c, s = math.exp(-decay) * math.cos(root), math.exp(-decay) * math.sin(root) / root
+    else:
+        c, s = math.exp(-decay), math.exp(-decay)
+    return c + decay * s, h * s, -s * h / (time_constant * time_constant), c - decay * s
