@@ -11,7 +11,7 @@ _vector, _matrix, _cube = types.float64[::1], types.float64[:, ::1], types.float
 
 
 @njit(types.void(_matrix, _matrix), cache=True, nogil=True)
-def solve_in_place(a, b):
+def solve_in_place(a, b):  # noqa: PLR0912 - loops over small matrices
     """Replace b by x of a x = b, a being destroyed: elimination with partial pivoting (Golub and Van Loan, 3.4.1)."""
     n, columns = b.shape
     for k in range(n):
@@ -59,7 +59,9 @@ def solve_blocks(blocks, right, damping):
                 b[i, j] /= scale[i]
 
 
-@njit(types.void(_matrix, _vector, _cube, _cube, _matrix, types.float64, _matrix, _vector, _cube), cache=True, nogil=True)
+@njit(
+    types.void(_matrix, _vector, _cube, _cube, _matrix, types.float64, _matrix, _vector, _cube), cache=True, nogil=True
+)
 def eliminate(h, gradient, cross, blocks, block_gradient, damping, h_left, gradient_left, solved):
     """Fill what is left of h and of the gradient, and solved [E, q, p + 1]: blocks^-1 (cross', block gradient)."""
     experiments, p, q = cross.shape

@@ -37,7 +37,7 @@ def estimate(value: Value) -> str:
 def interval(value: Value) -> str:
     """Write an interval, "6.71 to 6.97", and what it is if it is no 95 % interval."""
     if value.low == value.high:
-        return "taken from the readings, not fitted"
+        return "read off the data or at its limit, not estimated"
     if not (math.isfinite(value.low) and math.isfinite(value.high)):
         return "no interval"
     _, low, high = numbers(value.value, value.low, value.high)

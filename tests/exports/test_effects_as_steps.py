@@ -14,6 +14,7 @@ SUBSTEP = 0.025
 
 def effects_of(base):
     every = [EFFECTS[name]() for name in EFFECTS]
+    every += [effect.refined() for effect in every if effect.refined]
     return [e for e in every if isinstance(e, base) and e.simulated and e.time_power is None]
 
 

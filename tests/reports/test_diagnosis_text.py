@@ -213,7 +213,7 @@ def test_an_estimate_has_the_digits_that_its_interval_deserves(estimate, shown):
 
 
 def test_a_parameter_that_was_not_estimated_has_no_interval():
-    assert interval(Value("mid level", "V", 6.5, 6.5, 6.5)) == "taken from the readings, not fitted"
+    assert interval(Value("mid level", "V", 6.5, 6.5, 6.5)) == "read off the data or at its limit, not estimated"
 
 
 def test_suspects_beside_a_cause_are_said_after_it(named):

@@ -70,9 +70,7 @@ class FilteredSaturation(InputEffect):
         ]
 
     @staticmethod
-    def begun(
-        limit: np.ndarray, time_constant: float, damping: float, scales: SignalScales
-    ) -> Float[np.ndarray, " 7"]:
+    def begun(limit: np.ndarray, time_constant: float, damping: float, scales: SignalScales) -> Float[np.ndarray, " 7"]:
         """Return the numbers to begin with, from those of a limit behind a lag and from a section of second order."""
         rounding = 0.05 * (scales.u_high - scales.u_low)
         return np.array([max(limit[0], scales.dt), *limit[1:], time_constant, damping, rounding, 0.02])
