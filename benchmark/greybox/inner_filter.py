@@ -37,10 +37,14 @@ def with_inner_filter(selection: Selection, channels: Channels) -> Selection:
     limits = [term for term in chosen.plant.terms if isinstance(term.effect, InnerSaturation)]
     if before.plant.kind != "other" or not limits:
         return selection
-    limit, plants = limits[0], [fit for fit in before.orders if fit.plant.order]
+    plants = [fit for fit in before.orders or (before.estimate,) if fit.plant.order]
+    sections = list(_sections(plants, before))
+    if not sections:
+        return selection
+    limit = limits[0]
     numbers = chosen.theta[chosen.plant.part_of(limit)]
     filtered = Term(FilteredSaturation(), limit.channel)
-    fits = on_cores(partial(_fit, before, channels, filtered, numbers, list(_sections(plants, before))), plants)
+    fits = on_cores(partial(_fit, before, channels, filtered, numbers, sections), plants)
     errors = [block_errors(fit, before.valid, before.n_init, before.train) for _, fit in fits]
     other = select_around(*fits[as_good_as_best(errors)])
     return other if is_better_order(other, selection) else selection
