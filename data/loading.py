@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from simgap.data.formats.description import check_described
 from simgap.data.formats.folder import load_folder
 from simgap.data.formats.headings import find, listed
 from simgap.data.formats.one_record import Choices, dataset_of, record_of
@@ -19,6 +22,7 @@ from simgap.data.simulated_columns import split_off
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
+ENDINGS = (".csv", ".mat", ".parquet", ".txt", ".tsv", ".dat")  # of files of one record; any name may be one
 Kinds = str | Mapping[str, str] | None
 
 
@@ -129,14 +133,30 @@ def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Data
     if not isinstance(source, str | os.PathLike):
         return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
+        check_described(Path(source))
         _refuse_columns(choices, f"folder {Path(source)}")
         return load_folder(Path(source), simulated)
     if not os.path.exists(source):  # noqa: PTH110
-        raise UnusableInput(
-            f"there is no data set, folder or CSV file called {os.fspath(source)!r}; "
-            f"known data sets are {', '.join(DATASETS.names())}"
-        )
+        raise UnusableInput(_nowhere(os.fspath(source)))
     return None
+
+
+def _nowhere(source: str) -> str:
+    """Say that there is no such source: of a path which files may be meant, of a bare name which data sets."""
+    folder, name = os.path.split(source)
+    if not folder and not name.lower().endswith(ENDINGS):
+        return (
+            f"there is no data set, folder or CSV file called {source!r}; known data sets are "
+            f"{', '.join(DATASETS.names())}"
+        )
+    folder = folder or "."
+    if not os.path.isdir(folder):  # noqa: PTH112
+        return f"there is no file {source}, because there is no folder {folder}"
+    with suppress(OSError):  # of a folder that may not be read
+        alike = get_close_matches(name, os.listdir(folder), n=2)  # noqa: PTH208
+        if alike:
+            return f"there is no file {source}; is {' or '.join(alike)} meant?"
+    return f"there is no file {source}, seen from the folder {Path.cwd()}"
 
 
 def read_table(source: Any, choices: Choices) -> Table:

@@ -124,11 +124,22 @@ def test_fit_ends_with_code_1_when_the_model_fails(capsys, folder, example, mode
     assert "Traceback" not in out + err
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "said"), [("--dt", "0,01", "such as 0.01"), ("--seed", "a", "whole number")]
+)
+def test_a_number_that_is_none_is_refused_with_the_way_to_write_it(capsys, folder, option, value, said):
+    code, _, err = run(capsys, "fit", "mean", folder, option, value)
+    assert code == 2
+    assert f"'{option}': write" in err
+    assert said in err
+    assert "value error" not in run(capsys, "list", "nosuch")[2].lower()
+
+
 def test_data_check_says_what_a_folder_holds(capsys, folder):
     code, out, _ = run(capsys, "data", "check", folder)
     assert code == 0
     assert "noise: usable, sampled every 0.1 s" in out
-    assert "test   2 experiments, 150 samples" in out
+    assert "test   experiments: 2, samples: 150" in out
     assert "output phi" in out
 
 
