@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.error_views.correlation import correlation_time
-from simgap.error_views.gain_interval import share_with_interval
+from simgap.error_views.gain_interval import blocks_of, least_share, share_with_interval
 from simgap.metrics import is_finite, pool, spread
 from simgap.reports.collection import Collection
 from simgap.reports.pooling import Standing
@@ -19,14 +19,15 @@ from simgap.reports.pooling import Standing
 HOW_TO_READ = (
     "Error / best: the free-run error of a row divided by that of the best row, over all outputs in units of their "
     "spread, with its 95 % interval. Where it holds 1, the row is not distinguishable from the best one, and its fit "
-    "is italic (underlined on a terminal)."
+    "is italic (underlined on a terminal). 'Record too short': the interval holds 1, and three times the ratio too."
 )
 HOW_IT_IS_MADE = (
     "Italic (underlined on a terminal): not distinguishable from the best row, because the 95 % interval of the ratio "
-    "of their errors holds 1. It comes from blocks of the test records that are longer than the memory of the errors, "
-    "and is wide where a record is not much longer than that. Each row is compared by itself, with the row that is "
+    "of their errors holds 1. It comes from blocks of the test records that are longer than the memory of the errors; "
+    "a record of few such blocks is too short to tell. Each row is compared by itself, with the row that is "
     "best on this very test, so that of many rows that are equally good chance puts some behind."
 )
+TELLS_NOTHING = 3.0  # times the ratio, and still within the interval
 ROUNDING = 1e-7  # of a stored run, in units of the output's spread; smaller errors are not compared
 
 
@@ -40,8 +41,18 @@ class ErrorRatio:
 
     @property
     def undecided(self) -> bool:
-        """Whether chance alone may have put the one before the other."""
-        return self.low <= 1 <= self.high
+        """Whether chance alone may have put the one before the other, in a record that could have told."""
+        return self.low <= 1 <= self.high and not self.too_short
+
+    @property
+    def too_short(self) -> bool:
+        """Whether the record tells nothing: the interval holds 1, and three times the ratio too."""
+        return self.low <= 1 and self.high > TELLS_NOTHING * self.ratio
+
+    def __str__(self) -> str:
+        """Write the ratio with its interval, or that the record is too short for one."""
+        interval = "record too short" if self.too_short else f"{self.low:.4g} to {self.high:.4g}"
+        return f"{self.ratio:.4g} ({interval})"
 
 
 Ratios = Mapping[str, Mapping[str, ErrorRatio]]  # by data set and label of the model; the best row has none
@@ -74,15 +85,18 @@ def error_ratio(
 
         ratio = sqrt(mean(losses) / mean(least)),   a loss: the sum over outputs of e_t^2, averaged over seeds
 
-    Errors are in units of each output's spread. The interval is that of a gain (`share_with_interval`): of the
-    difference of the two losses, from blocks longer than its memory, so that an error that both share cancels.
+    Errors are in units of each output's spread. The interval is that of a gain (`share_with_interval`), or lies above 1
+    where the difference of the two losses does (Diebold and Mariano, J. Business & Economic Statistics 13, 1995), from
+    blocks longer than its own memory: a slow error of the best model, which is small, does not make those longer.
     """
     losses, least = (np.mean(np.sum(e**2, axis=2), axis=0) + ROUNDING**2 for e in (errors, of_best))
     signals = [signal for e in (errors, of_best) for of_seed in e for signal in of_seed.T]
     memory = max(correlation_time(signal, lengths, 0)[0] for signal in signals)
-    shares = share_with_interval(losses, least, lengths, memory)
-    ratio, low, high = (1 / (1 - share) if share < 1 else math.inf for share in shares)
-    return ErrorRatio(ratio, low, high)
+    share, low, high = share_with_interval(losses, least, lengths, memory)
+    starts, correction = blocks_of(losses - least, lengths)
+    if low <= 0 < share and len(starts) > 1:
+        low = max(low, least_share(losses, least, starts, correction))
+    return ErrorRatio(*(1 / (1 - each) if each < 1 else math.inf for each in (share, low, high)))
 
 
 def _errors(collection: Collection, suite: str, standing: Standing) -> list[np.ndarray] | None:

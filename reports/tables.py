@@ -174,8 +174,8 @@ def _fit_cells(standing: Standing, ratios: Mapping[str, ErrorRatio] | None) -> l
     if not ratios:
         return [fit]
     one = ratios.get(standing.model)
-    text = f"{one.ratio:.4g} ({one.low:.4g} to {one.high:.4g})" if one else ""
-    return [replace(fit, second=_undecided(ratios, standing.model)), Cell(text, one.ratio if one else None)]
+    ratio = Cell(str(one), one.ratio) if one else Cell("")
+    return [replace(fit, second=_undecided(ratios, standing.model)), ratio]
 
 
 def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:

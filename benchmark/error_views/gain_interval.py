@@ -42,20 +42,16 @@ def share_with_interval(
     """
     losses = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
     d = losses[1] - losses[0]
-    tau, _ = correlation_time(d - means(d, np.repeat(np.arange(len(lengths)), lengths)), lengths, len(lengths))
-    starts = block_starts(lengths, max(2 * tau, len(d) / BLOCKS))
+    starts, correction = blocks_of(d, lengths)
     m = len(starts)
-    mean_length = len(d) / m
-    variance = m / max(1, m - 1) * np.sum(np.add.reduceat(d, starts) ** 2) / len(d) ** 2
-    correction = 1 - min(0.5, 0.5 * tau / mean_length) if m > len(lengths) else 1.0
-    variance /= correction
+    variance = m / max(1, m - 1) * np.sum(np.add.reduceat(d, starts) ** 2) / len(d) ** 2 / correction
     w = np.add.reduceat(losses.mean(axis=0), starts)
     freedom = max(1.0, w.sum() ** 2 / np.sum(w**2) - 1)
     reach = student.ppf(0.975, freedom) * math.sqrt(variance) if m > 1 else math.inf
     ratio = math.log(after.mean() / before.mean())
     share, low, high = (1 - math.exp(0.5 * min(ratio + r, LARGEST_EXPONENT)) for r in (0.0, reach, -reach))
     if low <= 0 < share and m > 1:
-        low = max(low, _least_share(before, after, starts, correction))
+        low = max(low, least_share(before, after, starts, correction))
     if low <= 0 < share and (of_most := _share_of_most(before, after, lengths, memory)) >= LARGE:
         low = min(of_most, share)
     return share, low, high
@@ -77,7 +73,15 @@ def _share_of_most(
     return 1 - math.sqrt(ratios[-1 - above]) if above >= 0 else -math.inf
 
 
-def _least_share(
+def blocks_of(d: Float[np.ndarray, " N"], lengths: Int[np.ndarray, " E"]) -> tuple[Int[np.ndarray, " m"], float]:
+    """Cut a difference of losses in blocks longer than its memory; return their starts and 1 - tau / 2 L."""
+    tau, _ = correlation_time(d - means(d, np.repeat(np.arange(len(lengths)), lengths)), lengths, len(lengths))
+    starts = block_starts(lengths, max(2 * tau, len(d) / BLOCKS))
+    m = len(starts)
+    return starts, 1 - min(0.5, 0.5 * tau * m / len(d)) if m > len(lengths) else 1.0
+
+
+def least_share(
     before: Float[np.ndarray, " N"], after: Float[np.ndarray, " N"], starts: Int[np.ndarray, " m"], correction: float
 ) -> float:
     """Find the smallest gain that the difference of the losses does not reject; no logarithm of a small mean enters.

@@ -57,6 +57,25 @@ def test_what_both_models_get_wrong_alike_hides_no_difference():
     assert np.mean([one.low > 1 for one in found]) > 2 * np.mean([one.low > 1 for one in alone])
 
 
+def test_a_small_slow_error_of_the_best_hides_no_large_one_that_is_fast():
+    rng = np.random.default_rng(6)
+    decided = []
+    for _ in range(100):
+        errors, of_best = 6 * slow_noise(rng, 580, 30), slow_noise(rng, 580, 200)
+        ratio = error_ratio(errors.reshape(1, -1, 1), of_best.reshape(1, -1, 1), np.array([580]))
+        decided.append(ratio.low > 1)
+    assert np.mean(decided) > 0.88  # 0.8 of the log of the ratio alone, whose blocks are as long as the slow error asks
+
+
+def test_a_record_that_is_shorter_than_few_memories_tells_nothing():
+    rng = np.random.default_rng(7)
+    found = [compared(rng, 1.3, 1, 25) for _ in range(40)]
+    assert np.mean([one.too_short for one in found]) > 0.3
+    assert not any(one.too_short and one.undecided for one in found)
+    assert all(("record too short" in str(one)) == one.too_short for one in found)
+    assert not any(compared(rng, 1.0, 1, 4000).too_short for _ in range(40))
+
+
 def test_a_perfect_model_and_one_that_grew_have_a_ratio():
     rng = np.random.default_rng(3)
     errors = rng.standard_normal((1, 200, 1))
