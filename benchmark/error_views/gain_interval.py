@@ -77,8 +77,8 @@ def blocks_of(d: Float[np.ndarray, " N"], lengths: Int[np.ndarray, " E"]) -> tup
     """Cut a difference of losses in blocks longer than its memory; return their starts and 1 - tau / 2 L."""
     tau, _ = correlation_time(d - means(d, np.repeat(np.arange(len(lengths)), lengths)), lengths, len(lengths))
     starts = block_starts(lengths, max(2 * tau, len(d) / BLOCKS))
-    m = len(starts)
-    return starts, 1 - min(0.5, 0.5 * tau * m / len(d)) if m > len(lengths) else 1.0
+    mean_length = len(d) / len(starts)
+    return starts, 1 - min(0.5, 0.5 * tau / mean_length) if len(starts) > len(lengths) else 1.0
 
 
 def least_share(
