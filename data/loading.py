@@ -107,13 +107,16 @@ def read(
     return Reading(dataset, () if said is None else (*told(dataset.channels), *said), theirs)
 
 
-def read_recordings(source: Any, channels: Channels, dt: float | None = None) -> Recordings:
-    """Read what a model that was fitted on such channels can simulate; `source` and dt are those of `load`.
+def read_recordings(
+    source: Any, channels: Channels, dt: float | None = None, resample: float | None = None, split_gaps: bool = False
+) -> Recordings:
+    """Read what a model that was fitted on such channels can simulate; the other arguments are those of `load`.
 
     A file is one experiment, unsplit, of the columns that the channels name. Raises UnusableInput.
     """
-    choices = Choices([c.name for c in channels.inputs], [c.name for c in channels.outputs], dt)
-    known = source if isinstance(source, Dataset) else _known(source, Choices(dt=dt))
+    of_file = Choices(dt=dt, resample=resample, split_gaps=split_gaps)
+    choices = replace(of_file, inputs=[c.name for c in channels.inputs], outputs=[c.name for c in channels.outputs])
+    known = source if isinstance(source, Dataset) else _known(source, of_file)
     if known is not None:
         return Recordings(known.test, known.training.valid + known.training.train, known.channels)
     table = read_table(source, choices)
