@@ -90,7 +90,7 @@ class Experiment:
                 row, channel = np.argwhere(~(np.abs(values) <= LARGEST_VALUE))[0]
                 raise UnusableInput(
                     f"{self.name}: {column}[{row}, {channel}] is {values[row, channel]}, which is no measurement; "
-                    f"correct it or cut the record before it"
+                    f"correct it or end the record at the row before"
                 )
             values.flags.writeable = False
             object.__setattr__(self, column, values)

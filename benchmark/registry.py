@@ -8,6 +8,7 @@ import importlib.util
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -94,7 +95,9 @@ class Registry:
                 return self._plugins()[name].load()
             except Exception as error:  # a stranger's package may fail in any way
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
-        raise UnusableInput(f"there is no {self.kind} called {name!r}; known are {', '.join(self.names())}")
+        alike = get_close_matches(name, self.names(), n=2)
+        meant = f" is {' or '.join(alike)} meant?" if alike else ""
+        raise UnusableInput(f"there is no {self.kind} called {name!r};{meant} known are {', '.join(self.names())}")
 
     def module(self, name: str) -> str:
         """The module of simgap that defines it; empty for somebody's own."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from simgap.data.formats.description import check_described
 from simgap.data.formats.folder import load_folder
 from simgap.data.formats.headings import find, listed
 from simgap.data.formats.one_record import Choices, dataset_of, record_of
@@ -19,6 +22,7 @@ from simgap.data.simulated_columns import split_off
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
+ENDINGS = (".csv", ".mat", ".parquet", ".txt", ".tsv", ".dat")  # of files of one record; any name may be one
 Kinds = str | Mapping[str, str] | None
 
 
@@ -103,13 +107,16 @@ def read(
     return Reading(dataset, () if said is None else (*told(dataset.channels), *said), theirs)
 
 
-def read_recordings(source: Any, channels: Channels, dt: float | None = None) -> Recordings:
-    """Read what a model that was fitted on such channels can simulate; `source` and dt are those of `load`.
+def read_recordings(
+    source: Any, channels: Channels, dt: float | None = None, resample: float | None = None, split_gaps: bool = False
+) -> Recordings:
+    """Read what a model that was fitted on such channels can simulate; the other arguments are those of `load`.
 
     A file is one experiment, unsplit, of the columns that the channels name. Raises UnusableInput.
     """
-    choices = Choices([c.name for c in channels.inputs], [c.name for c in channels.outputs], dt)
-    known = source if isinstance(source, Dataset) else _known(source, Choices(dt=dt))
+    of_file = Choices(dt=dt, resample=resample, split_gaps=split_gaps)
+    choices = replace(of_file, inputs=[c.name for c in channels.inputs], outputs=[c.name for c in channels.outputs])
+    known = source if isinstance(source, Dataset) else _known(source, of_file)
     if known is not None:
         return Recordings(known.test, known.training.valid + known.training.train, known.channels)
     table = read_table(source, choices)
@@ -129,14 +136,30 @@ def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Data
     if not isinstance(source, str | os.PathLike):
         return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
+        check_described(Path(source))
         _refuse_columns(choices, f"folder {Path(source)}")
         return load_folder(Path(source), simulated)
     if not os.path.exists(source):  # noqa: PTH110
-        raise UnusableInput(
-            f"there is no data set, folder or CSV file called {os.fspath(source)!r}; "
-            f"known data sets are {', '.join(DATASETS.names())}"
-        )
+        raise UnusableInput(_nowhere(os.fspath(source)))
     return None
+
+
+def _nowhere(source: str) -> str:
+    """Say that there is no such source: of a path which files may be meant, of a bare name which data sets."""
+    folder, name = os.path.split(source)
+    if not folder and not name.lower().endswith(ENDINGS):
+        return (
+            f"there is no data set, folder or CSV file called {source!r}; known data sets are "
+            f"{', '.join(DATASETS.names())}"
+        )
+    folder = folder or "."
+    if not os.path.isdir(folder):  # noqa: PTH112
+        return f"there is no file {source}, because there is no folder {folder}"
+    with suppress(OSError):  # of a folder that may not be read
+        alike = get_close_matches(name, os.listdir(folder), n=2)  # noqa: PTH208
+        if alike:
+            return f"there is no file {source}; is {' or '.join(alike)} meant?"
+    return f"there is no file {source}, seen from the folder {Path.cwd()}"
 
 
 def read_table(source: Any, choices: Choices) -> Table:

@@ -11,11 +11,11 @@ import numpy as np
 
 from simgap.records import Dataset
 from simgap.reports import confusion, crossover, recovery
+from simgap.reports.collection import Collection, Run
 from simgap.reports.diagnosis.traces import axis_range, thin
 from simgap.reports.latex import to_latex
 from simgap.reports.leaderboard import all_tables, read_suites
 from simgap.reports.pooling import Standing
-from simgap.reports.site.collection import Collection, Run
 from simgap.reports.site.names import file_names
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
     if not public and not (out / ".gitignore").exists():
         (out / ".gitignore").write_text("*\n", encoding="utf-8")  # they may hold samples that are not ours to give
     written = []
-    for suite, listed in all_tables(folder, collection.suites).items():
+    for suite, listed in all_tables(collection).items():
         tables = {f"{suite}-{table.title}": table for table in listed}
         for title, name in file_names(tables).items():
             written.append(out / f"{name}.tex")

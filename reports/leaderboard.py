@@ -10,7 +10,9 @@ import pandas as pd
 
 from simgap.records import Result, UnusableInput
 from simgap.reports import recovery
+from simgap.reports.collection import Collection
 from simgap.reports.crossover import crossover_tables, of_crossover
+from simgap.reports.error_ratios import Ratios, error_ratios
 from simgap.reports.modes import modes_table
 from simgap.reports.paper.claims import claims, claims_table
 from simgap.reports.paper.tables import of_paper, paper_tables
@@ -50,7 +52,7 @@ def report(folder: str | Path = "results") -> Report:
     """
     folder = Path(folder)
     suites = read_suites(folder)
-    tables = all_tables(folder, suites)
+    tables = all_tables(Collection(folder, suites))
     markdown = folder / "leaderboard.md"
     markdown.write_text(_page(tables), encoding="utf-8")
     frames = [tidy(results).assign(suite=suite) for suite, results in suites.items()]
@@ -61,23 +63,28 @@ def report(folder: str | Path = "results") -> Report:
     return Report(tables, markdown, csv)
 
 
-def all_tables(folder: Path, suites: dict[str, list[Result]]) -> dict[str, list[Table]]:
+def all_tables(collection: Collection) -> dict[str, list[Table]]:
     """Make the tables of each suite and, under the name of its folder, of the recovery study."""
+    suites = collection.suites
     crossover = [row for results in suites.values() if of_crossover(results) for row in results]
-    tables = {suite: tables_of(results, crossover) for suite, results in suites.items()}
-    study = recovery.tables(folder)
+    tables = {
+        suite: tables_of(results, crossover, {} if of_crossover(results) else error_ratios(collection, suite))
+        for suite, results in suites.items()
+    }
+    study = recovery.tables(collection.folder)
     return tables | ({recovery.FOLDER: study} if study else {})
 
 
-def tables_of(results: list[Result], crossover: Sequence[Result] = ()) -> list[Table]:
+def tables_of(results: list[Result], crossover: Sequence[Result] = (), ratios: Ratios | None = None) -> list[Table]:
     """Make the overview and each data set's table, before them the paper's tables and claims for its suite.
 
-    The rows of the crossover study have tables of their own, and decide some of those claims.
+    The rows of the crossover study have tables of their own, and decide some of those claims. `ratios` compare rows
+    with the best one of their data set.
     """
     if of_crossover(results):
         return crossover_tables(results)
     of_all = [table for table in (skill_table(results), modes_table(results)) if table]
-    return [*_of_paper(results, crossover), overview(results), *of_all, *_of_datasets(results)]
+    return [*_of_paper(results, crossover), overview(results, ratios), *of_all, *_of_datasets(results, ratios)]
 
 
 def brief(results: list[Result]) -> list[Table]:
@@ -92,8 +99,9 @@ def _of_paper(results: list[Result], crossover: Sequence[Result] = ()) -> list[T
     return [*paper_tables(results), claims_table(claims(results, crossover))] if of_paper(results) else []
 
 
-def _of_datasets(results: list[Result]) -> list[Table]:
-    return [dataset_table(results, dataset) for dataset in sorted({result.dataset for result in results})]
+def _of_datasets(results: list[Result], ratios: Ratios | None = None) -> list[Table]:
+    datasets = sorted({result.dataset for result in results})
+    return [dataset_table(results, dataset, (ratios or {}).get(dataset)) for dataset in datasets]
 
 
 def read_suites(folder: Path) -> dict[str, list[Result]]:

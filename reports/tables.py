@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import pandas as pd
 
 from simgap.records import Result
+from simgap.reports.error_ratios import HOW_IT_IS_MADE, HOW_TO_READ, ErrorRatio, Ratios
 from simgap.reports.pooling import Spread, Standing, standings
 from simgap.results.store import plain
 
@@ -21,7 +22,10 @@ FIGURES = ("rmse", "nrmse", "fit_percent", "r2", "mse", "mae", "std", "n_scored"
 
 @dataclass(frozen=True)
 class Cell:
-    """One entry: its text, and the number by which the best entry of a column, or the second best, is found."""
+    """One entry: its text, and the number by which the best of a column, or the second best, is found.
+
+    Second best is, where errors were compared, what chance cannot tell from the best.
+    """
 
     text: str
     value: float | None = None
@@ -60,40 +64,41 @@ def tidy(results: Sequence[Result]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def overview(results: Sequence[Result]) -> Table:
-    """Make a table of the fit in percent of the free run: models down, data sets across, the best model first."""
+def overview(results: Sequence[Result], ratios: Ratios | None = None) -> Table:
+    """Make a table of the fit in percent of the free run: models down, data sets across, the best model first.
+
+    `ratios` of errors to those of the best row mark what cannot be told from it.
+    """
+    ratios = ratios or {}
     found = standings(results)
     datasets = sorted({standing.dataset for standing in found})
     notes = Notes()
     rows = []
     for model in dict.fromkeys(s.model for s in found):
         mine = {s.dataset: s for s in found if s.model == model}
-        cells = [_fit_cell(mine[name], notes) if name in mine else Cell("") for name in datasets]
+        cells = [
+            _fit_cell(mine[name], notes, _undecided(ratios.get(name), model)) if name in mine else Cell("")
+            for name in datasets
+        ]
         rows.append([Cell(model), *cells])
     rows.sort(key=lambda row: sum(_or_worst(cell.value) for cell in row[1:]), reverse=True)
     for column in range(1, len(datasets) + 1):
         _mark_best(rows, column, max)
-    return Table("Free-run fit in percent", ["model", *datasets], rows, notes.texts)
+    how_made = [HOW_IT_IS_MADE] if any(ratios.values()) else []
+    return Table("Free-run fit in percent", ["model", *datasets], rows, notes.texts + how_made)
 
 
-def dataset_table(results: Sequence[Result], dataset: str) -> Table:
-    """Make a table of RMSE, fit, RMSE by horizon, size and time of all models on one data set, the best first."""
+def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, ErrorRatio] | None = None) -> Table:
+    """Make a table of RMSE, fit, RMSE by horizon, size and time of all models on one data set, the best first.
+
+    `ratios` of errors to those of the best row, by model, have a column of their own where there are any.
+    """
     found = [standing for standing in standings(results) if standing.dataset == dataset]
     rows_of = [row for standing in found for row in standing.rows]
     experiments = list(dict.fromkeys(row.experiment for row in rows_of))
     units = {output: row.units.get(output, "") for row in rows_of for output in row.metrics}
     groups = [[e] for e in experiments] if 1 < len(experiments) <= COLUMNS_PER_EXPERIMENT else [experiments]
     horizons = _horizons(rows_of)
-
-    columns = ["model", "status"]
-    for group in groups:
-        columns += [_heading(output, unit, group, len(groups)) for output, unit in units.items()]
-    columns.append("fit %")
-    if horizons:
-        steps = "/".join(horizons)
-        columns += [_with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
-    columns += ["parameters", "fit s"]
-
     notes = Notes()
     found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
     rows = []
@@ -105,14 +110,16 @@ def dataset_table(results: Sequence[Result], dataset: str) -> Table:
         size, seconds = standing.n_params(), standing.seconds()
         rows.append([
             Cell(standing.model), Cell(status_of(standing) + notes.of(standing)),
-            *errors, spread_cell(standing.fit_percent(), "z.1f", standing.failed), *ahead,
+            *errors, *_fit_cells(standing, ratios), *ahead,
             Cell("" if size is None else str(size)), Cell("" if seconds is None else f"{seconds:.2g}"),
         ])  # fmt: skip
     n_errors = len(groups) * len(units)
     for column in range(2, n_errors + 2):
         _mark_best(rows, column, min)
     _mark_best(rows, n_errors + 2, max)
-    return Table(dataset, columns, rows, notes.texts + warnings_of(rows_of))
+    columns = _columns(units, groups, horizons, bool(ratios))
+    how_to_read = [HOW_TO_READ] if ratios else []
+    return Table(dataset, columns, rows, [*notes.texts, *how_to_read, *warnings_of(rows_of)])
 
 
 def warnings_of(rows: Sequence[Result]) -> list[str]:
@@ -151,10 +158,24 @@ def spread_cell(spread: Spread | None, form: str, failed: bool) -> Cell:
     return Cell(text, spread.median)
 
 
-def _fit_cell(standing: Standing, notes: Notes) -> Cell:
+def _fit_cell(standing: Standing, notes: Notes, undecided: bool) -> Cell:
     cell = spread_cell(standing.fit_percent(), "z.1f", standing.failed)
     text = status_of(standing) if cell.text == "-" else cell.text
-    return replace(cell, text=text + notes.of(standing))
+    return replace(cell, text=text + notes.of(standing), second=undecided)
+
+
+def _undecided(ratios: Mapping[str, ErrorRatio] | None, model: str) -> bool:
+    return bool(ratios) and model in ratios and ratios[model].undecided
+
+
+def _fit_cells(standing: Standing, ratios: Mapping[str, ErrorRatio] | None) -> list[Cell]:
+    """Write the fit in percent and, where errors were compared, the ratio to the best row's."""
+    fit = spread_cell(standing.fit_percent(), "z.1f", standing.failed)
+    if not ratios:
+        return [fit]
+    one = ratios.get(standing.model)
+    ratio = Cell(str(one), one.ratio) if one else Cell("")
+    return [replace(fit, second=_undecided(ratios, standing.model)), ratio]
 
 
 def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:
@@ -186,6 +207,19 @@ def _mark_best(rows: list[list[Cell]], column: int, best_of: Callable[[list[floa
 def _horizons(rows: Sequence[Result]) -> list[str]:
     present = {h for row in rows for figures in row.metrics.values() for h in figures.get("rmse_by_horizon", {})}
     return [horizon for horizon in HORIZONS if horizon in present]
+
+
+def _columns(
+    units: Mapping[str, str], groups: Sequence[Sequence[str]], horizons: Sequence[str], compared: bool
+) -> list[str]:
+    columns = ["model", "status"]
+    for group in groups:
+        columns += [_heading(output, unit, group, len(groups)) for output, unit in units.items()]
+    columns += ["fit %", "error / best"] if compared else ["fit %"]
+    if horizons:
+        steps = "/".join(horizons)
+        columns += [_with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
+    return [*columns, "parameters", "fit s"]
 
 
 def _heading(output: str, unit: str, experiments: Sequence[str], n_groups: int) -> str:

@@ -28,6 +28,13 @@ from simgap.cli import next as next_command
 from simgap.cli import open as opening
 from simgap.records import UnusableInput
 
+PLAIN = {
+    "Input should be a valid number, unable to parse string as a number": "write a number with a point and without a "
+    "unit, such as 0.01",
+    "Input should be a valid integer, unable to parse string as an integer": "write a whole number",
+    "Value error, ": "",
+}
+
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command("run")(run.run)
 app.command("report")(report.report)
@@ -64,12 +71,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code = app(args=arguments, prog_name="simgap", standalone_mode=False)
     except (UnusableInput, typer.TyperException) as error:
-        return _refuse(error.format_message() if isinstance(error, typer.TyperException) else str(error))
+        return _refuse(
+            _in_plain_words(error.format_message()) if isinstance(error, typer.TyperException) else str(error)
+        )
     except OSError as error:
         return _refuse(f"{error.filename or 'a file'} cannot be read or written: {error.strerror or error}")
     except (KeyboardInterrupt, typer.Abort):
         return 130
     return code if isinstance(code, int) else 0
+
+
+def _in_plain_words(message: str) -> str:
+    """Say of a value that was refused how to write it; the parser speaks of types."""
+    for said, instead in PLAIN.items():
+        message = message.replace(said, instead)
+    return message
 
 
 def _refuse(sentence: str) -> int:

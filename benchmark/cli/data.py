@@ -54,7 +54,7 @@ def check(
         write_json(json, described)
     typer.echo(f"{described['name']}: usable, sampled every {described['sampling_time']:g} s")
     for split, counts in described["splits"].items():
-        typer.echo(f"  {split:5}  {counts['experiments']} experiments, {counts['samples']} samples")
+        typer.echo(f"  {split:5}  experiments: {counts['experiments']}, samples: {counts['samples']}")
     typer.echo(f"  n_init {described['n_init']}")
     for role in ("inputs", "outputs"):
         for channel in described[role]:

@@ -7,7 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, check_writable, parse_params, write_json
+from simgap.cli.options import (
+    Inputs,
+    Json,
+    Outputs,
+    Resample,
+    SamplingTime,
+    SplitGaps,
+    check_writable,
+    parse_params,
+    read_data,
+    write_json,
+)
 
 
 def range_test(
@@ -16,6 +27,8 @@ def range_test(
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the weights and of the batches.")] = 0,
     json: Json = None,
@@ -25,7 +38,6 @@ def range_test(
 
     Take a rate below the steepest fall; the paper's section 3.4 took the lowest one that still falls fast.
     """
-    from simgap.data import load
     from simgap.records import UnusableInput
     from simgap.reports.curves import LearningRates
     from simgap.running import fitting
@@ -34,7 +46,7 @@ def range_test(
     built: Any = fitting.build(model, parse_params(param or ()))
     if not hasattr(built, "range_test"):
         raise UnusableInput(f"{model} has no learning rate; networks have: see `simgap list models`")
-    dataset = load(data, inputs=inputs or (), outputs=outputs or (), dt=dt)
+    dataset = read_data(data, inputs, outputs, dt, None, resample, split_gaps).dataset
     curve = LearningRates(model, dataset.name, *built.range_test(dataset.training, seed))
     if json is not None:
         write_json(json, curve.to_json())

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, SamplingTime, names, write_json
+from simgap.cli.options import Inputs, Json, Outputs, Resample, SamplingTime, SplitGaps, names, write_json
 from simgap.cli.progress import shown
 from simgap.records import UnusableInput
 
@@ -30,6 +30,8 @@ def run(
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     json: Json = None,
 ) -> None:
     """Fit models to data sets and score their free-run simulation; a second run carries on.
@@ -40,7 +42,8 @@ def run(
     if suite == "recovery":
         from simgap.cli import recovery
 
-        refused = {"models": models, "model": model, "input": inputs, "output": outputs, "dt": dt}
+        refused = {"models": models, "model": model, "input": inputs, "output": outputs, "dt": dt,
+                   "resample": resample, "split-gaps": split_gaps}  # fmt: skip
         if given := [name for name, value in refused.items() if value]:
             raise UnusableInput(f"--{given[0]}: the recovery study takes none; --datasets names its rigs")
         recovery.run(names(datasets) or [], 1 if seeds is None else seeds, engine, jobs, address, out, json)
@@ -56,7 +59,7 @@ def run(
     with shown(console, _summary) as progress:
         results = runner.run(
             suite, names(models), model or (), names(datasets), seeds, jobs, engine, address, out,
-            inputs or (), outputs or (), dt, progress,
+            inputs or (), outputs or (), dt, progress, resample, split_gaps,
         )  # fmt: skip
     if json is not None:
         write_json(json, store.encoded(results))

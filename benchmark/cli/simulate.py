@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from simgap.cli.options import Json, SamplingTime, check_writable, write_json
+from simgap.cli.options import Json, Resample, SamplingTime, SplitGaps, check_writable, write_json
 
 
 def simulate(
@@ -15,6 +15,8 @@ def simulate(
     data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
     experiment: Annotated[str | None, typer.Option(help="Only this experiment; else all to test on.")] = None,
     dt: SamplingTime = None,
+    resample: Resample = None,
+    split_gaps: SplitGaps = False,
     out: Annotated[Path | None, typer.Option(help="Write time, inputs and outputs into this CSV file.")] = None,
     json: Json = None,
 ) -> None:
@@ -33,7 +35,7 @@ def simulate(
     model = read_saved(saved)
     about = model.fitted_on
     try:
-        simulations = on_records.simulate(model, data, experiment, dt)
+        simulations = on_records.simulate(model, data, experiment, dt, resample, split_gaps)
     except UnusableInput:
         raise
     except Exception as error:  # the model's own fault, without our traceback

@@ -39,12 +39,19 @@ class LoadArguments:
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     dt: float | None = None
+    resample: float | None = None
+    split_gaps: bool = False
 
     def load(self) -> Dataset:
         """Raises UnusableInput."""
         from simgap.data import load
 
-        return load(self.data, inputs=self.inputs, outputs=self.outputs, dt=self.dt)
+        return load(**self.source)
+
+    @property
+    def source(self) -> dict[str, Any]:
+        """The same by the names that `simgap.load` gives them."""
+        return {"source": self.data} | {name: value for name, value in vars(self).items() if name != "data"}
 
 
 @dataclass(frozen=True)
@@ -133,8 +140,7 @@ class Job:
         with contextlib.suppress(Exception):  # neither a full disk nor a model's own attributes must cost the figures
             polynomial = getattr(model, "polynomial", None)
             about = self.about.provenance
-            source = {"source": _absolute(self.arguments.data), "inputs": self.arguments.inputs,
-                      "outputs": self.arguments.outputs, "dt": self.arguments.dt}  # fmt: skip
+            source = self.arguments.source | {"source": _absolute(self.arguments.data)}
             artefacts.write(self.artefact, Artefact(
                 runs, dataset.n_init, dataset.training.dt, about.get("model_sha256", ""), self.card.sha256,
                 () if polynomial is None else polynomial.state_space, source,

@@ -55,14 +55,13 @@ def choose_entries(suite: Suite, choice: Choice, message: Message) -> list[Entry
 
 
 def load_arguments(
-    datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None
-) -> list[LoadArguments]:
-    """How to load the named data sets. Columns and dt go to the CSV files among them, if there are."""
+    datasets: Sequence[str], inputs: Sequence[str], outputs: Sequence[str], dt: float | None,
+    resample: float | None = None, split_gaps: bool = False,
+) -> list[LoadArguments]:  # fmt: skip
+    """How to load the named data sets. Columns and times go to the CSV files among them, if there are."""
     files = [name for name in datasets if Path(name).is_file()]
-    return [
-        LoadArguments(name, tuple(inputs), tuple(outputs), dt) if name in files or not files else LoadArguments(name)
-        for name in datasets
-    ]
+    of_file = LoadArguments("", tuple(inputs), tuple(outputs), dt, resample, split_gaps)
+    return [replace(of_file, data=name) if name in files or not files else LoadArguments(name) for name in datasets]
 
 
 def choose_data(suite: Suite, named: Sequence[LoadArguments], message: Message) -> list[tuple[LoadArguments, Card]]:

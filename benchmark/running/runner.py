@@ -30,16 +30,18 @@ def run(
     outputs: Sequence[str] = (),
     dt: float | None = None,
     progress: Listener | None = None,
+    resample: float | None = None,
+    split_gaps: bool = False,
 ) -> list[Result]:
     """Run a suite and return its results, those of an earlier run into the same folder included.
 
     `models` are registered names or labels of the suite, `model` are `file.py:Class`; either replaces the
-    suite's models, `datasets` (names or paths) its data sets. `inputs`, `outputs` and `dt` [s] tell how to
-    read CSV files. `jobs` is how many run at a time on this machine; `engine` is a registered one: "ray" hands
-    them to the Ray cluster at `address` instead. What is stored for the same data and code is not computed again.
-    Raises UnusableInput.
+    suite's models, `datasets` (names or paths) its data sets. `inputs`, `outputs`, `dt` [s], `resample` [s] and
+    `split_gaps` tell how to read CSV files, as for `simgap.load`. `jobs` is how many run at a time on this machine;
+    `engine` is a registered one: "ray" hands them to the Ray cluster at `address` instead. What is stored for the same
+    data and code is not computed again. Raises UnusableInput.
     """
-    files = planning.load_arguments(_listed(datasets), _listed(inputs), _listed(outputs), dt)
+    files = planning.load_arguments(_listed(datasets), _listed(inputs), _listed(outputs), dt, resample, split_gaps)
     choice = Choice(tuple(_listed(models)), tuple(_listed(model)), tuple(files))
     execution = Execution(engine, jobs, {"address": address}, Path(out), progress or log_messages)
     return run_suite(planning.with_seeds(load_suite(suite), seeds), choice, execution)

@@ -105,7 +105,9 @@ def read_saved(file: str | Path) -> SavedModel:
     except UnusableInput:
         raise
     except Exception as error:  # a model that is built of what is none may raise anything
-        raise UnusableInput(f"{file} is no saved model: {_one_line(error)}") from error
+        raise UnusableInput(
+            f"{file} is no saved model, such as --save of fit and diagnose writes: {_one_line(error)}"
+        ) from error
 
 
 def _one_line(error: BaseException) -> str:

@@ -56,23 +56,28 @@ class Simulation:
 
 
 def simulate(
-    saved: str | Path | SavedModel, data: Any, experiment: str | None = None, dt: float | None = None
-) -> list[Simulation]:
+    saved: str | Path | SavedModel, data: Any, experiment: str | None = None, dt: float | None = None,
+    resample: float | None = None, split_gaps: bool = False,
+) -> list[Simulation]:  # fmt: skip
     """Let a saved model run free over other records, from their first n_init measured outputs.
 
     `saved` is a file of `save_model`, `data` what `simgap.load` takes: a file is simulated as a whole, of a data set
-    the test experiments, or the one called `experiment`. dt in seconds, for files without a column of time. Raises
-    UnusableInput where columns, units or sampling time are not those that the model was fitted on.
+    the test experiments, or the one called `experiment`. dt in seconds, for files without a column of time; `resample`
+    and `split_gaps` are those of `simgap.load`. Raises UnusableInput where columns, units or sampling time are not
+    those that the model was fitted on.
     """
     saved = saved if isinstance(saved, SavedModel) else read_saved(saved)
-    return [_simulated(saved, x) for x in matching_experiments(saved.fitted_on, data, experiment, dt)]
+    return [
+        _simulated(saved, x) for x in matching_experiments(saved.fitted_on, data, experiment, dt, resample, split_gaps)
+    ]
 
 
 def matching_experiments(
-    about: FittedOn, data: Any, experiment: str | None = None, dt: float | None = None
-) -> list[Experiment]:
+    about: FittedOn, data: Any, experiment: str | None = None, dt: float | None = None,
+    resample: float | None = None, split_gaps: bool = False,
+) -> list[Experiment]:  # fmt: skip
     """Read the records that `simulate` takes, for a model that was fitted on such data. Raises UnusableInput."""
-    recordings = read_recordings(data, about.channels, dt)
+    recordings = read_recordings(data, about.channels, dt, resample, split_gaps)
     source = os.fspath(data) if isinstance(data, str | os.PathLike) else "the data"
     for role in ("inputs", "outputs"):
         _check_columns(source, role, getattr(recordings.channels, role), getattr(about.channels, role))

@@ -84,7 +84,7 @@ def _counted(table: Table, column: str, t: Float[np.ndarray, " T"]) -> Clock:
 def _whole_microseconds(cells: Any) -> Int64[np.ndarray, " T"]:
     missing = np.flatnonzero(cells.isna().to_numpy())
     if missing.size:
-        raise BadCell(int(missing[0]), "the time is missing; fill it in or cut the record before it")
+        raise BadCell(int(missing[0]), "the time is missing; fill it in or end the record at the row before")
     naive = cells.dt.tz_convert("UTC").dt.tz_localize(None) if cells.dt.tz is not None else cells
     return naive.to_numpy().astype("datetime64[us]").astype(np.int64)
 

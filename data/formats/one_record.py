@@ -109,7 +109,8 @@ def _sampling_time(table: Table, clock: Clock | None, choices: Choices) -> float
                             f"call it 't' or 'time'")  # fmt: skip
     if choices.dt is None and clock is None:
         raise UnusableInput(
-            f"{table.source}: the sampling time is not known; give dt in seconds or a column 't' or 'time'"
+            f"{table.source}: the sampling time is not known; give it in seconds (--dt 0.01, or dt=0.01 in "
+            f"Python), or call the column of the time 't' or 'time'"
         )
     if choices.dt is None:
         assert clock is not None
@@ -122,7 +123,10 @@ def _sampling_time(table: Table, clock: Clock | None, choices: Choices) -> float
 def _told(
     table: Table, clock: Clock | None, channels: Channels, dt: float, choices: Choices, said: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Say what was inferred of the file and its time; nothing of a plain file with a column t or time in seconds."""
+    """Say what was inferred of the file and its time; nothing of a plain file with a column t or time in seconds.
+
+    Times without a unit that are a second or more apart may as well count milliseconds or samples, so that is said.
+    """
     layout = table.layout
     about = [SEPARATED[layout.separator]] if layout.separator != "," else []
     about += ["decimal commas"] if layout.decimal == "," else []
@@ -130,8 +134,12 @@ def _told(
     about += [f"units from row {table.first_row - 1}"] if layout.units else []
     units = any(channel.unit for channel in (*channels.inputs, *channels.outputs))
     units |= any(channel.kind_from == "header" for channel in channels.outputs)
-    if clock is not None and (about or said or units or clock.counts or clock.column not in ("t", "time")):
+    slow = clock is not None and dt >= 1 and not clock.counts and not table.heading(clock.column).unit
+    if clock is not None and (about or said or units or clock.counts or slow or clock.column not in ("t", "time")):
         counts = f", which counts {clock.counts}" if clock.counts else ""
+        counts = (
+            f", taken for seconds because its heading says no unit, such as '{clock.column} [ms]'" if slow else counts
+        )
         what = "time" if choices.resample else f"sampling time {dt:g} s"
         about.append(f"{what} from column {table.heading(clock.column).name}{counts}")
     return (*about, *said)

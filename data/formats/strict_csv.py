@@ -12,12 +12,17 @@ from reprlib import repr as short
 import numpy as np
 from jaxtyping import Float
 
-from simgap.data.formats.layout import LINE, Layout, layout_of
+from simgap.data.formats.layout import LINE, NUMBER, Layout, layout_of
 from simgap.data.formats.tables import BadCell, Table
 from simgap.records import UnusableInput
 
 # What a decimal number is made of. float() alone would also take 1_000, nan, inf and foreign digits.
 NUMBER_CHARACTERS = frozenset("0123456789+-.eE ")
+LONGEST_PREAMBLE = 100  # lines above the names of the columns that are looked through
+NOT_THE_NAMES = (
+    "is taken for the names of the columns, but the rows below do not fit them; begin each line above the names "
+    "with # or delete it"
+)
 
 
 def strict_table(path: Path, content: bytes) -> Table:
@@ -32,7 +37,13 @@ def strict_table(path: Path, content: bytes) -> Table:
     header, first = layout.skipped + 1, layout.first_row
     if not names:
         raise UnusableInput(f"{path}: row {header} is empty; it must name the columns")
+    if all(map(NUMBER.fullmatch, names)):
+        raise UnusableInput(
+            f"{path}: row {header} holds numbers where the columns are named; put a line of names above"
+        )
     if len(names) == 1 and (mark := next((mark for mark in "| " if mark in names[0]), "")):
+        if any(len(row) > 1 for row in islice(rows, LONGEST_PREAMBLE)):
+            raise UnusableInput(f"{path}: row {header} {NOT_THE_NAMES}")
         why = f"is one column, or cells apart by {mark!r}"
         raise UnusableInput(f"{path}: row {header} {why}; save the file with commas, semicolons or tabs between cells")
     columns: list[list[str]] = [[] for _ in names]
@@ -43,7 +54,7 @@ def strict_table(path: Path, content: bytes) -> Table:
         elif blank:
             raise UnusableInput(f"{path}: row {blank} is empty; delete it or fill in the sample")
         elif len(row) != len(names):
-            raise _uneven(path, number, row, names)
+            raise _uneven(path, number, row, names, header)
         else:
             for cells, cell in zip(columns, row, strict=True):
                 cells.append(cell)
@@ -79,9 +90,9 @@ def parse_decimal_commas(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
 
 def _check_cell(index: int, cell: str, example: str = "-1.25") -> None:
     if not cell.strip():
-        raise BadCell(index, "the cell is empty; fill it in or cut the record before it")
+        raise BadCell(index, "the cell is empty; fill it in or end the record at the row before")
     if cell.strip().lower().lstrip("+-") in ("nan", "inf", "infinity", "na", "n/a", "null", "none"):
-        raise BadCell(index, f"{short(cell)} is no measurement; correct it or cut the record before it")
+        raise BadCell(index, f"{short(cell)} is no measurement; correct it or end the record at the row before")
     try:
         float(cell)
         plain = NUMBER_CHARACTERS.issuperset(cell)
@@ -97,7 +108,7 @@ def _text(path: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         row = content.count(b"\n", 0, error.start) + 1
         raise UnusableInput(
-            f"{path}: row {row} is not UTF-8 text; save the file as CSV in the encoding UTF-8"
+            f"{path}: row {row} is not UTF-8 text; save the file as CSV in the encoding UTF-8 (in Excel: CSV UTF-8)"
         ) from None
     if "\0" in text:
         row = text.count("\n", 0, text.index("\0")) + 1
@@ -128,7 +139,10 @@ def _rows(path: Path, text: str, layout: Layout) -> Iterator[list[str]]:
         raise UnusableInput(f"{path}: {why}") from None
 
 
-def _uneven(path: Path, number: int, row: list[str], names: tuple[str, ...]) -> UnusableInput:
+def _uneven(path: Path, number: int, row: list[str], names: tuple[str, ...], header: int) -> UnusableInput:
+    no_sample = len(row) < len(names) or not any(map(NUMBER.fullmatch, row))
+    if number == header + 1 and no_sample:  # more text, or the names
+        return UnusableInput(f"{path}: row {header} {NOT_THE_NAMES}")
     if len(row) < len(names):
         why = f"ends before column {short(names[len(row)])}; complete or delete the row"
     else:

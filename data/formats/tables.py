@@ -76,7 +76,7 @@ class Table:
             raise self.refuse(bad.index, column, bad.why) from None
         wrong = np.flatnonzero(~(np.abs(values) <= LARGEST_VALUE))
         if wrong.size:
-            why = f"{values[wrong[0]]} is no measurement; correct it or cut the record before it"
+            why = f"{values[wrong[0]]} is no measurement; correct it or end the record at the row before"
             raise self.refuse(int(wrong[0]), column, why)
         return values
 

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.records import Dataset
+from simgap.reports.collection import Run
 from simgap.reports.diagnosis.traces import axis_range
 from simgap.reports.rendering import printable
-from simgap.reports.site.collection import Run
 from simgap.reports.site.curves import Chart, chart, curve, line
 from simgap.reports.site.names import plot_text
 from simgap.reports.site.residuals import correlation_charts

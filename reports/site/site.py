@@ -11,7 +11,9 @@ from simgap.data import describe
 from simgap.records import UnusableInput
 from simgap.registry import MODELS
 from simgap.reports import recovery
+from simgap.reports.collection import Collection, Run, group_of
 from simgap.reports.crossover import crossover_tables, of_crossover
+from simgap.reports.error_ratios import error_ratios
 from simgap.reports.leaderboard import ABOUT_SUITE, HOW_TO_READ, read_suites
 from simgap.reports.modes import WINDOWED, modes_table
 from simgap.reports.paper.claims import claims, claims_table
@@ -19,7 +21,6 @@ from simgap.reports.paper.tables import NAMES, of_paper, paper_tables
 from simgap.reports.pooling import Standing
 from simgap.reports.published import WARNING, published_tables
 from simgap.reports.site import diagnoses, runs, signals
-from simgap.reports.site.collection import Collection, Run, group_of
 from simgap.reports.site.crossover_charts import crossover_charts
 from simgap.reports.site.diagnoses import MARK
 from simgap.reports.site.fit_charts import horizon_charts, training_chart
@@ -84,6 +85,7 @@ class _Site:
             model: group_of([s for found in collection.standings.values() for s in found if s.model == model])
             for model in collection.models
         }
+        self.ratios = {name: error_ratios(collection, name) for name in collection.suites if name not in self.crossover}
         self.writer = Writer(folder, self._menu())
 
     def _menu(self) -> list[tuple[str, str]]:
@@ -117,7 +119,7 @@ class _Site:
         for name, rows in self.collection.suites.items():
             if name in self.crossover and len(self.collection.suites) > 1:
                 continue  # has a page of its own
-            table = overview(rows)
+            table = overview(rows, self.ratios.get(name))
             shown = [row[0].text for row in table.rows]
             suites.append({
                 "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "skill": skill_table(rows),
@@ -147,7 +149,7 @@ class _Site:
         ]
         models, _ = self._links("../")
         tables = [
-            (suite, dataset_table(rows, name), self.groups)
+            (suite, dataset_table(rows, name, self.ratios.get(suite, {}).get(name)), self.groups)
             for suite, rows in self.collection.suites.items() if any(row.dataset == name for row in rows)
         ]  # fmt: skip
         self.writer.page(

@@ -2,6 +2,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import simgap
@@ -124,11 +125,46 @@ def test_fit_ends_with_code_1_when_the_model_fails(capsys, folder, example, mode
     assert "Traceback" not in out + err
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "said"), [("--dt", "0,01", "such as 0.01"), ("--seed", "a", "whole number")]
+)
+def test_a_number_that_is_none_is_refused_with_the_way_to_write_it(capsys, folder, option, value, said):
+    code, _, err = run(capsys, "fit", "mean", folder, option, value)
+    assert code == 2
+    assert f"'{option}': write" in err
+    assert said in err
+    assert "value error" not in run(capsys, "list", "nosuch")[2].lower()
+
+
+def test_every_command_that_reads_a_file_takes_the_remedies_for_uneven_time(capsys, tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.concatenate((0.1 * np.arange(200), 100 + 0.1 * np.arange(200), 200 + 0.1 * np.arange(200)))
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+    y = np.convolve(u, 0.5 ** np.arange(8))[: len(u)] + 0.01 * rng.normal(size=600)
+    file, model, out = tmp_path / "gap.csv", tmp_path / "arx.simgap", tmp_path / "out"
+    np.savetxt(file, np.column_stack((t, u, y)), delimiter=",", header="t,u,y", comments="")
+    named = (file, "--input", "u", "--output", "y")
+    assert "--split-gaps starts" in run(capsys, "fit", "arx", *named)[2]
+    assert run(capsys, "fit", "arx", *named, "--split-gaps", "--save", model)[0] == 0
+    assert run(capsys, "simulate", model, file)[0] == 2
+    said = run(capsys, "simulate", model, file, "--split-gaps")[1]
+    assert all(f"piece_{k}" in said for k in (1, 2, 3))
+    suite = ("run", "--models", "arx", "--out", out, "--datasets")
+    assert run(capsys, *suite, *named)[0] == 2
+    assert run(capsys, *suite, *named, "--split-gaps")[0] == 0
+    assert run(capsys, "report", out, "--no-site")[0] == 0
+    assert "no learning rate" in run(capsys, "range-test", "arx", *named, "--resample", "0.1")[2]
+
+
+def test_a_misspelt_name_is_answered_with_the_one_that_is_meant(capsys, folder):
+    assert "called 'arxx'; is arx" in run(capsys, "fit", "arxx", folder)[2]
+
+
 def test_data_check_says_what_a_folder_holds(capsys, folder):
     code, out, _ = run(capsys, "data", "check", folder)
     assert code == 0
     assert "noise: usable, sampled every 0.1 s" in out
-    assert "test   2 experiments, 150 samples" in out
+    assert "test   experiments: 2, samples: 150" in out
     assert "output phi" in out
 
 

@@ -55,7 +55,13 @@ def test_a_doubled_column_that_nobody_uses_is_no_matter(tmp_path):
 
 
 def test_a_file_without_a_header_is_refused_by_its_first_line(refused_cell):
-    refused_cell("".join(ROWS), row=1, column="u")
+    assert "put a line of names above" in refused_cell("".join(ROWS), row=1, column=None)
+
+
+@pytest.mark.parametrize("above", ["Project: servo\n", "Project,,\nby hand\n", "# cart\nProject: servo, 3rd\n"])
+def test_lines_above_the_names_of_the_columns_are_named_with_what_to_do(refused_cell, above):
+    row = 2 if above.startswith("#") else 1
+    assert "begin each line above the names with #" in refused_cell(above + HEADER + "".join(ROWS), row, None)
 
 
 def test_a_row_that_ends_early_is_named_with_the_column_it_lacks(refused_cell):

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from simgap.data import load
+from simgap.data import load, read
 
 ROWS = 50
 
@@ -116,7 +116,7 @@ def test_a_column_cannot_be_input_and_output(frame, refused):
 
 
 def test_a_sampling_time_that_is_not_known_is_asked_for(frame, refused):
-    assert "give dt" in refused(frame[["u", "y"]], ["u"], ["y"])
+    assert "--dt 0.01" in refused(frame[["u", "y"]], ["u"], ["y"])
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, float("nan"), float("inf")])
@@ -140,6 +140,20 @@ def test_one_row_has_no_sampling_time(frame, refused):
 def test_an_unknown_name_lists_the_known_ones(refused, source):
     sentence = refused(source)
     assert "cascaded_tanks, ced" in sentence
+
+
+def test_a_file_that_is_not_there_is_told_from_a_name_and_one_like_it_is_offered(refused, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("t,u,y\n")
+    assert refused("lgo.csv", ["u"], ["y"]) == "there is no file lgo.csv; is log.csv meant?"
+    assert f"seen from the folder {tmp_path}" in refused("other.mat")
+    assert "because there is no folder nix" in refused("nix/log.csv")
+
+
+@pytest.mark.parametrize(("heading", "step", "said"), [("t", 10, True), ("t", 0.1, False), ("t [s]", 10, False)])
+def test_times_that_may_count_milliseconds_are_said_to_be_taken_for_seconds(frame, heading, step, said):
+    frame = frame.assign(t=step * np.arange(len(frame))).rename(columns={"t": heading})
+    assert ("10 s from column t, taken for seconds because" in str(read(frame, ["u"], ["y"]))) == said
 
 
 def test_the_columns_of_a_registered_data_set_cannot_be_named_again(refused):

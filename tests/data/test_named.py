@@ -34,7 +34,8 @@ def test_a_name_says_what_is_unusual_in_one_order():
         ("gimbal-n_init2.5", "n_init is a whole number"),
         ("gimbal-data0", "makes 0 training experiments"),
         ("gimbal-data1000000", "1 to 5000 can be made"),
-        ("gimbal-log.csv", "there is no data set, folder or CSV file"),
+        ("gimbal-log", "there is no data set, folder or CSV file"),
+        ("gimbal-log.csv", "there is no file gimbal-log.csv"),
     ],
 )
 def test_what_cannot_be_made_is_refused_in_one_sentence(name, said):

@@ -176,4 +176,4 @@ def test_a_date_of_pandas_that_jumps_is_quoted(refused):
 def test_a_folder_or_nothing_under_such_a_name_is_refused(tmp_path, refused, ending):
     (tmp_path / f"a.{ending}").mkdir()
     assert "holds no dataset.toml" in refused(tmp_path / f"a.{ending}")
-    assert "there is no data set" in refused(tmp_path / f"b.{ending}", ["u"], ["y"])
+    assert "there is no file" in refused(tmp_path / f"b.{ending}", ["u"], ["y"])

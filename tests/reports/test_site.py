@@ -14,7 +14,7 @@ import simgap
 from simgap.cli import main
 from simgap.data import save
 from simgap.records import UnusableInput
-from simgap.reports.site.collection import DataCopy
+from simgap.reports.collection import DataCopy
 from simgap.reports.site.names import file_names
 from simgap.reports.site.residuals import bound, correlations
 from simgap.results import artefacts, store

@@ -97,13 +97,19 @@ class Collection:
         return found
 
     def _run(self, suite: str, standing: Standing) -> Run | None:
+        seed, artefact = next(iter(self.artefacts_of(suite, standing).items()), (0, None))
+        return Run(suite, standing, seed, artefact) if artefact else None
+
+    def artefacts_of(self, suite: str, standing: Standing) -> dict[int, Artefact]:
+        """Read the artefacts of the same code and data as their rows, by seed."""
         first = {row.seed: row for row in reversed(standing.rows)}
+        found = {}
         for seed in sorted(first):
             path = artefacts.path_of(self._home(suite), suite, first[seed])
             artefact = artefacts.read(path) if path.is_file() else None
             if artefact is not None and artefact.belongs_to(first[seed]):
-                return Run(suite, standing, seed, artefact)
-        return None
+                found[seed] = artefact
+        return found
 
     def _home(self, suite: str) -> Path:
         """The folder of results; one above where only the folder of one suite is reported."""
