@@ -6,26 +6,20 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
-from scipy.stats import binom
-from scipy.stats import t as student
+from jaxtyping import Float
 
-from simgap.error_views.correlation import correlation_time, means
+from simgap.error_views.correlation import correlation_time
+from simgap.error_views.gain_interval import share_with_interval
 from simgap.findings import Gain
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.samples import sizes_of
 from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset, Experiment
 
-# More blocks hardly narrow an interval; longer ones forgive a memory that was taken for too short (Schmeiser 1982).
-BLOCKS = 16
-FEW = 8  # experiments
-LARGE = 0.5  # the gain in nearly every block that needs no further proof
 # In units of the output's spread: the error of a simulation that grows without bound, and one that is rounding.
 LARGEST_ERROR = 1e60
 GROWN = 1e30
 SMALLEST_ERROR = 1e-9
-LARGEST_EXPONENT = 200.0  # of e, in a ratio of squared errors
 
 
 def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
@@ -70,110 +64,6 @@ def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[
         rmse[channel.name], std = error, spread(y[:, i])
         fit[channel.name] = relative(error, std)["fit_percent"] if std else math.nan
     return {"rmse": rmse, "fit_percent": fit}
-
-
-def share_with_interval(
-    before: Float[np.ndarray, " N"],
-    after: Float[np.ndarray, " N"],
-    lengths: Int[np.ndarray, " E"],
-    memory: float = math.inf,
-) -> tuple[float, float, float]:
-    """Compute the gain from the losses (squared errors) of all test samples of E experiments, and its 95 % interval.
-
-        share = 1 - sqrt(mean(after) / mean(before)),   d_t = after_t / mean(after) - before_t / mean(before)
-        variance of log(mean(after) / mean(before)) = m / (m - 1) sum_i (sum_{t in i} d_t)^2 / N^2 / (1 - tau / 2 L)
-
-    The logarithm is linear in the losses through d (delta method), and d is summed over the m blocks i of all
-    experiments (method of batch means, Schmeiser, Operations Research 30, 1982; Ibragimov and Muller, J. Business &
-    Economic Statistics 28, 2010). Blocks are as long as leaves 16 of them, but at least twice the memory tau of d
-    within the experiments, or as `block_starts` says. Neighbours of mean length L still share part of their noise,
-    which 1 - tau / 2 L (1/2 at least) pays for, exact where the autocorrelation decays exponentially. Student's t has
-    sum(w)^2 / sum(w^2) - 1 degrees of freedom with the blocks' shares w of the losses, because an error that sits in
-    two of ten blocks is seen twice (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
-
-    A gain that is large in nearly every block is believed whatever the scatter of the blocks' sizes: see
-    `_share_of_most`. `memory` is that of the errors themselves, in samples.
-    """
-    losses = np.stack([before / before.mean(), after / after.mean()])  # [2, N]
-    d = losses[1] - losses[0]
-    tau, _ = correlation_time(d - means(d, np.repeat(np.arange(len(lengths)), lengths)), lengths, len(lengths))
-    starts = block_starts(lengths, max(2 * tau, len(d) / BLOCKS))
-    m = len(starts)
-    mean_length = len(d) / m
-    variance = m / max(1, m - 1) * np.sum(np.add.reduceat(d, starts) ** 2) / len(d) ** 2
-    correction = 1 - min(0.5, 0.5 * tau / mean_length) if m > len(lengths) else 1.0
-    variance /= correction
-    w = np.add.reduceat(losses.mean(axis=0), starts)
-    freedom = max(1.0, w.sum() ** 2 / np.sum(w**2) - 1)
-    reach = student.ppf(0.975, freedom) * math.sqrt(variance) if m > 1 else math.inf
-    ratio = math.log(after.mean() / before.mean())
-    share, low, high = (1 - math.exp(0.5 * min(ratio + r, LARGEST_EXPONENT)) for r in (0.0, reach, -reach))
-    if low <= 0 < share and m > 1:
-        low = max(low, _least_share(before, after, starts, correction))
-    if low <= 0 < share and (of_most := _share_of_most(before, after, lengths, memory)) >= LARGE:
-        low = min(of_most, share)
-    return share, low, high
-
-
-def _share_of_most(
-    before: Float[np.ndarray, " N"], after: Float[np.ndarray, " N"], lengths: Int[np.ndarray, " E"], memory: float
-) -> float:
-    """Find the gain that the median block exceeds, with 97.5 % confidence; no size of a loss enters.
-
-    The order statistics of the blocks' ratios after / before bound their median (Thompson, Annals of Mathematical
-    Statistics 7, 1936). Blocks are as long as the memory of the errors, which is about twice that of their squares, so
-    that a slow error that both simulations share is seen once. Where an error is large in one half of a record for a
-    reason, the memory of its square is found to be the record itself, and no scatter of blocks tells of a gain.
-    """
-    starts = block_starts(lengths, max(memory, len(before) / BLOCKS), least=1)
-    ratios = np.sort(np.add.reduceat(after, starts) / np.add.reduceat(before, starts))
-    above = int(binom.ppf(0.025, len(starts), 0.5)) - 1  # blocks that may lie above the bound
-    return 1 - math.sqrt(ratios[-1 - above]) if above >= 0 else -math.inf
-
-
-def _least_share(
-    before: Float[np.ndarray, " N"], after: Float[np.ndarray, " N"], starts: Int[np.ndarray, " m"], correction: float
-) -> float:
-    """Find the smallest gain that the difference of the losses does not reject; no logarithm of a small mean enters.
-
-        t(rho) = (rho mean(before) - mean(after)) / sd of the blocks' mean of (after - rho before)
-
-    Fieller (Supplement to the J. Royal Statistical Society 7, 1940); at rho = 1 the test of Diebold and Mariano (J.
-    Business & Economic Statistics 13, 1995). Where a gain is large, what is left sits in few blocks, and the interval
-    of the logarithm of its mean then reaches beyond zero though every block gained.
-    """
-    m = len(starts)
-    b, a = (np.add.reduceat(losses / before.mean(), starts) for losses in (before, after))
-
-    def rejected(rho: float) -> bool:
-        d, w = rho * b - a, a + rho * b
-        centred = d - d.mean()
-        freedom = max(1.0, w.sum() ** 2 / np.sum(w**2) - 1)
-        deviation = math.sqrt(m / (m - 1) * float(centred @ centred) / correction)
-        return bool(d.sum() > student.ppf(0.975, freedom) * deviation)
-
-    if not rejected(1.0):
-        return -math.inf
-    low, high = float(a.sum() / b.sum()), 1.0
-    for _ in range(40):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if rejected(middle) else (middle, high)
-    return 1 - math.sqrt(high)
-
-
-def block_starts(lengths: Int[np.ndarray, " E"], shortest: float, least: int = 2) -> Int[np.ndarray, " m"]:
-    """Cut experiments into equal blocks of at least so many samples; one that is shorter stays whole.
-
-    Few experiments are cut in `least` blocks even so: in two, where the scatter of few blocks would hardly be known.
-    """
-    counts = np.maximum(lengths // shortest, least if len(lengths) < FEW else 1).astype(int)
-    counts = np.minimum(counts, lengths)
-    ends = np.cumsum(lengths)
-    starts = [
-        end - length + length * np.arange(count) // count
-        for end, length, count in zip(ends, lengths, counts, strict=True)
-    ]
-    return np.concatenate(starts)
 
 
 def _bounded(error: np.ndarray) -> np.ndarray:

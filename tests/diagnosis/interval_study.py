@@ -14,8 +14,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import lfilter
 
-from simgap.diagnosis.gains import share_with_interval
 from simgap.error_views.correlation import correlation_time
+from simgap.error_views.gain_interval import share_with_interval
 
 EXPERIMENTS = (1, 2, 3, 4, 15)
 SAMPLES = (100, 300, 1000)

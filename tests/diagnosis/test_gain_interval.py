@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simgap.diagnosis.gains import block_starts, measure, share_with_interval
+from simgap.diagnosis.gains import measure
 from simgap.error_views.correlation import correlation_time
+from simgap.error_views.gain_interval import block_starts, share_with_interval
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 STUDY = runpy.run_path(str(Path(__file__).with_name("interval_study.py")))
