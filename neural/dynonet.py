@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed
-from simgap.neural.training.linear_blocks import Filtered, Mixed, Static, Stacked
-from simgap.neural.training.network import Network
+from simgap.neural.training.linear_blocks import Entry, Filtered, Stacked, Static
+from simgap.neural.training.network import STATEFUL, Network
 from simgap.registry import MODELS
+
+RADII, ANGLE = (0.4, 0.95), 1.0  # of the poles at first
 
 
 @MODELS.register("dynonet")
@@ -15,12 +18,17 @@ from simgap.registry import MODELS
 class DynoNet(Network):
     """FC(channels) - G - F - G - FC(ny): transfer functions G of order 2 `sections`, a static network F between."""
 
+    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=8, early_stop=40, batches=50)
+    free: ClassVar[int] = 300
+
+    epochs: int = 160
     channels: int = 16
     sections: int = 2
     hidden: int = 32
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
-        before, behind = (Filtered(self.channels, self.sections, (0.4, 0.95), 1.0) for _ in range(2))
-        body = Stacked([Mixed(inputs, self.channels), before, Static(self.channels, self.hidden), behind])
-        return Headed(body, self.channels, outputs)
+        entry = Entry(inputs, self.channels, 0 if self.windowed else inputs - outputs - 1)
+        before, behind = (Filtered(self.channels, self.sections, RADII, ANGLE) for _ in range(2))
+        static = Static(self.channels, self.hidden)
+        return Headed(Stacked([entry, before, static, behind]), self.channels, outputs)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed
-from simgap.neural.training.linear_blocks import Lru, Mixed, Stacked
-from simgap.neural.training.network import Network
+from simgap.neural.training.linear_blocks import Entry, Lru, Stacked
+from simgap.neural.training.network import STATEFUL, Network
 from simgap.registry import MODELS
+
+RADII, ANGLE = (0.4, 0.99), 1.0  # of the poles at first: a few samples to a few hundred, up to a sixth of the rate
 
 
 @MODELS.register("lru")
@@ -15,11 +18,15 @@ from simgap.registry import MODELS
 class LRU(Network):
     """FC(units) - layers x [x + GLU(LRU(x)), `states` complex states each] - FC(ny)."""
 
-    units: int = 32
-    states: int = 32
-    layers: int = 3
+    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=5, early_stop=30)
+
+    epochs: int = 100
+    units: int = 24
+    states: int = 24
+    layers: int = 2
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
-        layers = [Lru(self.units, self.states, (0.4, 0.99), 1.0, self.dropout) for _ in range(self.layers)]
-        return Headed(Stacked([Mixed(inputs, self.units), *layers]), self.units, outputs)
+        entry = Entry(inputs, self.units, 0 if self.windowed else inputs - outputs - 1)
+        layers = [Lru(self.units, self.states, RADII, ANGLE, self.dropout) for _ in range(self.layers)]
+        return Headed(Stacked([entry, *layers]), self.units, outputs)

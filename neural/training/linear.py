@@ -69,10 +69,10 @@ def scan(v: Float[Tensor, "B T C n"], a: Float[Tensor, "C n n"]) -> Float[Tensor
 
 
 class Diagonal(nn.Module):
-    """s(k) = lambda s(k-1) + gamma B x(k), y(k) = Re(C s(k)) + D x(k); N complex states (Orvieto et al. 2023, eq. 7).
+    """s(k) = lambda s(k-1) + gamma B x(k), y(k) = Re(C s(k)) + D x(k); N complex states (Orvieto et al. 2023, 3.3, 3.4).
 
-    |lambda| = exp(-exp(nu)) < 1, its angle exp(theta): a ring between the radii `radii`, angles up to `angle`.
-    `weight_out` holds C with the sign of its imaginary part turned, as it multiplies [Re s, Im s].
+    |lambda| = exp(-exp(nu)) < 1 for whatever weights, its angle exp(theta): at first a ring between `radii`, angles up
+    to `angle`. `weight_out` [F, 2N] is C with the sign of its imaginary part turned, as it multiplies [Re s, Im s].
     """
 
     def __init__(self, features: int, states: int, radii: tuple[float, float], angle: float) -> None:
@@ -91,11 +91,11 @@ class Diagonal(nn.Module):
         size, angle = torch.exp(-torch.exp(self.nu)), torch.exp(self.theta)
         return size * torch.cos(angle), size * torch.sin(angle)
 
-    def entry(self) -> Float[Tensor, "2N F"]:
-        """Give gamma B, which makes states of equal size from white inputs."""
+    def entry(self) -> Float[Tensor, "S F"]:
+        """Give gamma B, real parts first, S = 2N: from a white input it makes states of equal size."""
         return torch.exp(self.gamma).repeat(2)[:, None] * self.weight_in
 
-    def states(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T 2N"]:
+    def states(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T S"]:
         """Compute the states at all samples, real parts first."""
         v, (re, im) = nn.functional.linear(x, self.entry()), self.poles()
         if x.device.type == "cpu":
@@ -103,13 +103,13 @@ class Diagonal(nn.Module):
         a = torch.stack((torch.stack((re, -im), 1), torch.stack((im, re), 1)), 1)  # [N, 2, 2]
         return scan(v.unflatten(2, (2, -1)).transpose(2, 3), a).transpose(2, 3).flatten(2)
 
-    def outputs(self, x: Float[Tensor, "*B F"], s: Float[Tensor, "*B 2N"]) -> Float[Tensor, "*B F"]:
+    def outputs(self, x: Float[Tensor, "*B F"], s: Float[Tensor, "*B S"]) -> Float[Tensor, "*B F"]:
         """Read the outputs off the states."""
         return nn.functional.linear(s, self.weight_out) + self.through * x
 
 
 class Filters(nn.Module):
-    """y_c = G_c(q) x_c, a transfer function for each of C channels (Forgione and Piga 2021, section 3).
+    """y_c = G_c(q) x_c, a transfer function for each of C channels (Forgione and Piga 2021).
 
     Numerator and denominator are products of `sections` of order two. 1 + a1 q^-1 + a2 q^-2 is stable for whatever
     weights p: a1 = 2 tanh(p1), a2 = |a1| - 1 + (2 - |a1|) (1 + tanh(p2)) / 2.

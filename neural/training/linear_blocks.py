@@ -43,16 +43,19 @@ class Pointwise(Block):
         return self.forward(x[:, -1])
 
 
-class Mixed(Pointwise):
-    """A fully connected layer to other channels."""
+class Entry(Pointwise):
+    """W [x, u g] + b: the features x of a sample, and its `gated` inputs u once more while outputs are measured (g = 1).
 
-    def __init__(self, inputs: int, channels: int) -> None:
+    With both, a linear filter can compare what was measured with what it makes of the inputs, and so find its state.
+    """
+
+    def __init__(self, inputs: int, channels: int, gated: int) -> None:
         super().__init__()
-        self.full = full(inputs, channels)
+        self.gated, self.full = gated, full(inputs + gated, channels)
 
     def forward(self, x: Float[Tensor, "*B F"]) -> Float[Tensor, "*B G"]:
-        """Compute W x + b."""
-        return self.full(x)
+        """Compute the channels; g is the last feature."""
+        return self.full(torch.cat((x, x[..., : self.gated] * x[..., -1:]), dim=-1))
 
 
 class Static(Pointwise):
@@ -84,7 +87,10 @@ class Filtered(Block):
 
 
 class Lru(Block):
-    """x + GLU(LRU(x)), GLU(y) = (W y + b) sigmoid(V y + c) (Orvieto et al. 2023, figure 1, without normalisation)."""
+    """x + GLU(LRU(x)), GLU(y) = (W y + b) sigmoid(V y + c) (Orvieto et al. 2023).
+
+    Without the paper's normalisation of the features, which would take the amplitude of a signal away.
+    """
 
     def __init__(
         self, features: int, states: int, radii: tuple[float, float], angle: float, dropout: float = 0.0

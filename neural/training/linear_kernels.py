@@ -69,7 +69,7 @@ def run_section(x, num, den, y):
 def back_section(x, num, den, y, dy, dx, d_num, d_den):
     """Run `run_section` backwards: w = dy filtered by 1/A in reversed time, and dx = w filtered by B.
 
-    d b_j = sum of w(k) x(k-j), d a_i = - sum of w(k) y(k-i) (Forgione and Piga 2021, section 3).
+    d b_j = sum of w(k) x(k-j), d a_i = - sum of w(k) y(k-i) (Forgione and Piga 2021).
     """
     batch, steps, n = x.shape
     one, two = np.empty(n, x.dtype), np.empty(n, x.dtype)
