@@ -21,7 +21,7 @@ from simgap.step_form import StepForm, source_of
 RECURRENT: dict[type, tuple[str, int]] = {Srnn: ("rnn", 1), Gru: ("gru", 1), Lstm: ("lstm", 2)}  # parts of a state
 LAYERS = (
     steps.sigmoid, steps.weighted, steps.dense, steps.rnn, steps.gru, steps.lstm, steps.remember, steps.convolution,
-    steps.mean_of_two, steps.add, steps.copy, steps.gated, steps.squash, steps.gate, steps.diagonal, steps.reading,
+    steps.mean_of_two, steps.add, steps.copy, steps.gated, steps.squash, steps.gate, steps.diagonal, steps.read_off,
     steps.section,
 )  # fmt: skip
 STATEFUL = '''\
@@ -180,7 +180,7 @@ class _Writer:
         self.lines.append(f"dense({x}, {nx}, {v}, {states}, {weights}, 0)")
         self.lines.append(f"diagonal({v}, s, {at}, {states // 2}, {self.weights(*layer.poles())})")
         weights = self.weights(layer.weight_out, layer.through)
-        self.lines.append(f"reading({x}, {nx}, s, {at}, {states}, {y}, {weights})")
+        self.lines.append(f"read_off({x}, {nx}, s, {at}, {states}, {y}, {weights})")
         value, opening = self.dense(block.value, y, nx)[0], self.dense(block.gate, y, nx)[0]
         self.lines.append(f"gate({value}, {opening}, {nx}, {gated})")
         self.lines.append(f"add({x}, {gated}, {nx}, {around}, 0)")

@@ -133,7 +133,7 @@ def diagonal(v: list, s: list, at: int, n: int, re: list, im: list):
         s[at + i] = real
 
 
-def reading(x: list, nx: int, s: list, at: int, n: int, y: list, w: list, through: list):
+def read_off(x: list, nx: int, s: list, at: int, n: int, y: list, w: list, through: list):
     """y = W s + d x, of n numbers from s[at] on."""
     for i in range(nx):
         y[i] = weighted(i, s, at, n, w) + through[i] * x[i]
