@@ -153,8 +153,7 @@ class _Graph:
 
     def filtered(self, block: Filtered, x: str) -> str:
         """y(k) = b0 x(k) + s1(k-1), s1(k) = b1 x(k) - a1 y(k) + s2(k-1), s2(k) = b2 x(k) - a2 y(k), s2 behind s1."""
-        filters = block.filters
-        for num, den in zip(filters.weight_num, filters.denominators(), strict=True):
+        for num, den in block.filters.sections():
             (b0, b1, b2), (a1, a2) = (part.detach().cpu().double().numpy() for part in (num, den))
             n = len(b0)
             a = np.block([[np.diag(-a1), np.eye(n)], [np.diag(-a2), np.zeros((n, n))]])

@@ -112,7 +112,8 @@ class Filters(nn.Module):
     """y_c = G_c(q) x_c, a transfer function for each of C channels (Forgione and Piga 2021).
 
     Numerator and denominator are products of `sections` of order two. 1 + a1 q^-1 + a2 q^-2 is stable for whatever
-    weights p: a1 = 2 tanh(p1), a2 = |a1| - 1 + (2 - |a1|) (1 + tanh(p2)) / 2.
+    weights p: a1 = 2 tanh(p1), a2 = |a1| - 1 + (2 - |a1|) (1 + tanh(p2)) / 2. The numerator is (1 + a1 + a2) times its
+    weights, whose sum thus is the gain at rest: those of slow poles would be far smaller than a step of Adam.
     """
 
     def __init__(self, channels: int, sections: int, radii: tuple[float, float], angle: float) -> None:
@@ -124,17 +125,19 @@ class Filters(nn.Module):
         self.weight_den = nn.Parameter(torch.atanh(torch.stack((a1 / 2, inside), 1)))
         num = torch.randn(sections, 3, channels) * 0.1
         num[:, 0] += 1
-        self.weight_num = nn.Parameter(num * (1 + a1 + a2)[:, None])
+        self.weight_num = nn.Parameter(num)
 
-    def denominators(self) -> Float[Tensor, "S 2 C"]:
-        """Give a1 and a2 of all sections."""
+    def sections(self) -> list[tuple[Float[Tensor, "3 C"], Float[Tensor, "2 C"]]]:
+        """Give b0, b1, b2 and a1, a2 of each section."""
         p1, p2 = torch.tanh(self.weight_den).unbind(1)
         a1 = 2 * p1
-        return torch.stack((a1, a1.abs() - 1 + (2 - a1.abs()) * (1 + p2) / 2), 1)
+        a2 = a1.abs() - 1 + (2 - a1.abs()) * (1 + p2) / 2
+        num = (1 + a1 + a2)[:, None] * self.weight_num
+        return list(zip(num, torch.stack((a1, a2), 1), strict=True))
 
     def over(self, x: Float[Tensor, "B T C"]) -> Float[Tensor, "B T C"]:
         """Filter a sequence from rest."""
-        for num, den in zip(self.weight_num, self.denominators(), strict=True):
+        for num, den in self.sections():
             x = _Section.apply(x, num, den) if x.device.type == "cpu" else _doubled(x, num, den)
         return x
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,6 +13,9 @@ from torch import Tensor, nn
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.convolution import full
 from simgap.neural.training.linear import Diagonal, Filters
+
+
+BENT = 3.0  # standard deviation of what a static network bends, of channels of size one
 
 
 class Stacked(Block):
@@ -64,6 +68,9 @@ class Static(Pointwise):
     def __init__(self, channels: int, hidden: int) -> None:
         super().__init__()
         self.inner, self.outer = full(channels, hidden), full(hidden, channels)
+        # Glorot's weights without offsets begin nearly linear and odd, and many trainings stay there.
+        nn.init.normal_(self.inner.weight, std=BENT / math.sqrt(channels))
+        nn.init.uniform_(self.inner.bias, -1, 1)
 
     def forward(self, x: Float[Tensor, "*B F"]) -> Float[Tensor, "*B F"]:
         """Compute F(x)."""

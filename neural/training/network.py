@@ -53,7 +53,7 @@ class Network(ABC):
     window: int = 40
     epochs: int = 30
     batches: int = 0
-    learning_rate: float = 0.0  # 0: 1e-4 windowed, 3e-3 stateful
+    learning_rate: float = 0.0  # 0: 1e-4 windowed; stateful 3e-3, or what the model says
     l2: float = 0.0
     dropout: float = 0.0
     resident: bool = True

@@ -187,8 +187,7 @@ class _Writer:
         return around, nx
 
     def filtered(self, block: Filtered, x: str, nx: int) -> tuple[str, int]:
-        filters = block.filters
-        for num, den in zip(filters.weight_num, filters.denominators(), strict=True):
+        for num, den in block.filters.sections():
             y, at = self.array(nx), self.take(2 * nx)
             self.lines.append(f"section({x}, {nx}, s, {at}, {y}, {self.weights(num, den)})")
             x = y

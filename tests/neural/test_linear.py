@@ -60,8 +60,8 @@ def test_a_cascade_of_sections_is_the_transfer_function_of_their_products():
     ours = layer.over(x)
     for c in range(3):
         num, den = np.ones(1), np.ones(1)
-        for b, a in zip(layer.weight_num.detach(), layer.denominators().detach(), strict=True):
-            num, den = np.convolve(num, b[:, c]), np.convolve(den, [1, *a[:, c]])
+        for b, a in layer.sections():
+            num, den = np.convolve(num, b[:, c].detach()), np.convolve(den, [1, *a[:, c].detach()])
         np.testing.assert_allclose(ours[:, :, c].detach(), lfilter(num, den, x[:, :, c], axis=1), atol=1e-12)
 
 
@@ -88,7 +88,7 @@ def test_off_the_cpu_a_scan_of_doubled_steps_gives_the_same_gradients_too():
 def test_no_weights_make_it_unstable(spread):
     layer = filters(50, 4)
     layer.weight_den.data = spread * drawn(4, 2, 50)
-    for a1, a2 in layer.denominators().detach().transpose(1, 2).reshape(-1, 2).tolist():
+    for a1, a2 in torch.cat([den.detach() for _, den in layer.sections()], 1).t().tolist():
         assert np.abs(np.roots([1, a1, a2])).max() <= 1 + 1e-7
     ring = diagonal(3, 50)
     ring.nu.data, ring.theta.data = spread * drawn(50), spread * drawn(50)
@@ -100,7 +100,7 @@ def test_poles_begin_within_their_radii():
     re, im = diagonal(3, 200).poles()
     size = torch.hypot(re, im)
     assert RADII[0] - 1e-6 <= size.min() < 0.5 < 0.9 < size.max() <= RADII[1] + 1e-6
-    a1, a2 = filters(100, 2).denominators().detach().transpose(0, 1)
+    a1, a2 = torch.cat([den.detach() for _, den in filters(100, 2).sections()], 1)
     assert RADII[0] - 1e-6 <= a2.sqrt().min() < 0.5 < 0.9 < a2.sqrt().max() <= RADII[1] + 1e-6
     assert (a1.square() < 4 * a2).all()  # pairs
 
