@@ -16,9 +16,13 @@ RADII, ANGLE = (0.4, 0.99), 1.0  # of the poles at first: a few samples to a few
 @MODELS.register("lru")
 @dataclass
 class LRU(Network):
-    """FC(units) - layers x [x + GLU(LRU(x)), `states` complex states each] - FC(ny)."""
+    """FC(units) - layers x [x + GLU(LRU(x)), `states` complex states each] - FC(ny).
 
-    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=5, early_stop=30)
+    Stateful, it trains with another rate and for longer than `gru`, as chosen, like its sizes, on the validation part
+    of Wiener-Hammerstein: 6.6 mV with the usual recipe and three layers of 32, 1.3 with this.
+    """
+
+    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=5, early_stop=30, batches=60)
 
     epochs: int = 100
     units: int = 24
@@ -27,6 +31,5 @@ class LRU(Network):
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
-        entry = Entry(inputs, self.units, 0 if self.windowed else inputs - outputs - 1)
         layers = [Lru(self.units, self.states, RADII, ANGLE, self.dropout) for _ in range(self.layers)]
-        return Headed(Stacked([entry, *layers]), self.units, outputs)
+        return Headed(Stacked([Entry(inputs, self.units), *layers]), self.units, outputs)

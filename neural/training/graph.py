@@ -70,6 +70,11 @@ class _Graph:
                 z = self.add("Concat", *(self.block(branch, x) for branch in block.blocks), axis=2)
                 narrow = self.add("Relu", self.dense(block.narrow, z))
                 return self.add("Add", z, self.dense(block.wide, narrow))
+        return self.linear(block, x)
+
+    def linear(self, block: Any, x: str) -> str:
+        """Add a block of `linear_blocks`."""
+        match block:
             case Stacked():
                 for part in block.blocks:
                     x = self.block(part, x)

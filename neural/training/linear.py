@@ -69,7 +69,7 @@ def scan(v: Float[Tensor, "B T C n"], a: Float[Tensor, "C n n"]) -> Float[Tensor
 
 
 class Diagonal(nn.Module):
-    """s(k) = lambda s(k-1) + gamma B x(k), y(k) = Re(C s(k)) + D x(k); N complex states (Orvieto et al. 2023, 3.3, 3.4).
+    """s(k) = lambda s(k-1) + gamma B x(k), y(k) = Re(C s(k)) + D x(k) with N complex states (Orvieto et al. 2023).
 
     |lambda| = exp(-exp(nu)) < 1 for whatever weights, its angle exp(theta): at first a ring between `radii`, angles up
     to `angle`. `weight_out` [F, 2N] is C with the sign of its imaginary part turned, as it multiplies [Re s, Im s].

@@ -14,7 +14,6 @@ from simgap.neural.training.blocks import Block
 from simgap.neural.training.convolution import full
 from simgap.neural.training.linear import Diagonal, Filters
 
-
 BENT = 3.0  # standard deviation of what a static network bends, of channels of size one
 
 
@@ -48,12 +47,12 @@ class Pointwise(Block):
 
 
 class Entry(Pointwise):
-    """W [x, u g] + b: the features x of a sample, and its `gated` inputs u once more while outputs are measured (g = 1).
+    """W [x, u g] + b: the features x of a sample; `gated` inputs u come once more while outputs are measured (g = 1).
 
-    With both, a linear filter can compare what was measured with what it makes of the inputs, and so find its state.
+    With these, a linear filter can compare what was measured with what it makes of the inputs, and so find its state.
     """
 
-    def __init__(self, inputs: int, channels: int, gated: int) -> None:
+    def __init__(self, inputs: int, channels: int, gated: int = 0) -> None:
         super().__init__()
         self.gated, self.full = gated, full(inputs + gated, channels)
 

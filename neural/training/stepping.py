@@ -104,6 +104,11 @@ class _Writer:
                 return x, nx
             case Parallel():
                 return self.parallel(block, x, nx)
+        return self.linear(block, x, nx)
+
+    def linear(self, block: Any, x: str, nx: int) -> tuple[str, int]:
+        """Write a block of `linear_blocks`."""
+        match block:
             case Stacked():
                 for part in block.blocks:
                     x, nx = self.block(part, x, nx)
@@ -160,7 +165,6 @@ class _Writer:
         y = self.array(size)
         self.lines.append(f"add({z}, {wide}, {size}, {y}, 0)")
         return y, size
-
 
     def static(self, block: Static, x: str, nx: int) -> tuple[str, int]:
         inner, hidden = self.dense(block.inner, x, nx)

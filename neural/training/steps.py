@@ -140,7 +140,7 @@ def read_off(x: list, nx: int, s: list, at: int, n: int, y: list, w: list, throu
 
 
 def section(x: list, n: int, s: list, at: int, y: list, num: list, den: list):
-    """y(k) = b0 x(k) + b1 x(k-1) + b2 x(k-2) - a1 y(k-1) - a2 y(k-2), of n channels; two states of each from s[at] on."""
+    """y(k) = b0 x(k) + b1 x(k-1) + b2 x(k-2) - a1 y(k-1) - a2 y(k-2) of n channels; their states from s[at] on."""
     for i in range(n):
         y[i] = num[i] * x[i] + s[at + i]
         s[at + i] = num[n + i] * x[i] - den[i] * y[i] + s[at + n + i]
