@@ -23,10 +23,10 @@ class DynoNet(Network):
     Wiener-Hammerstein, Silverbox and the tanks.
     """
 
-    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=10, early_stop=40, batches=60)
+    stateful: ClassVar = replace(STATEFUL, learning_rate=1e-2, patience=8, early_stop=40, batches=60)
     free: ClassVar[int] = 300
 
-    epochs: int = 240
+    epochs: int = 160
     channels: int = 8
     sections: int = 3
     hidden: int = 32

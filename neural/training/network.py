@@ -47,7 +47,7 @@ class Network(ABC):
     stochastic: ClassVar[bool] = True
     parts: ClassVar = (Scaling,)  # records in a saved model
     stateful: ClassVar[Recipe] = STATEFUL
-    free: ClassVar[int] = sequences.FREE  # samples of a free run in training
+    free: ClassVar[int] = sequences.FREE  # samples of a free run in training, of records ten times as long
 
     mode: Literal["windowed", "stateful"] = "stateful"
     window: int = 40
@@ -121,7 +121,8 @@ class Network(ABC):
             self.inputs = 1 + nu
         else:
             n = data.n_init
-            examples = sequences.Sequences(data.train, self.of_x, self.of_y, n, self.free)
+            free = self.free if max(map(len, data.train)) >= 10 * self.free else sequences.FREE
+            examples = sequences.Sequences(data.train, self.of_x, self.of_y, n, free)
             held_out = sequences.Sequences(valid, self.of_x, self.of_y, n, *HELD_OUT)
             self.inputs = nu + ny + 1
         with torch.random.fork_rng(devices=[]):
