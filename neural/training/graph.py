@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 
 from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual
+from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
 from simgap.records import UnusableInput
 
@@ -19,9 +21,10 @@ RECURRENT: dict[type, tuple[str, tuple[int, ...], dict[str, int]]] = {
 
 
 class _Graph:
-    """Nodes and constants, as they are added; an array is known by its name."""
+    """Nodes and constants of a network, as they are added; an array is known by its name."""
 
-    def __init__(self) -> None:
+    def __init__(self, net: Any) -> None:
+        self.net = net
         self.nodes: list[Any] = []
         self.constants: list[Any] = []
 
@@ -67,6 +70,24 @@ class _Graph:
                 z = self.add("Concat", *(self.block(branch, x) for branch in block.blocks), axis=2)
                 narrow = self.add("Relu", self.dense(block.narrow, z))
                 return self.add("Add", z, self.dense(block.wide, narrow))
+        return self.linear(block, x)
+
+    def linear(self, block: Any, x: str) -> str:
+        """Add a block of `linear_blocks`."""
+        match block:
+            case Stacked():
+                for part in block.blocks:
+                    x = self.block(part, x)
+                return x
+            case Entry():
+                return self.entry(block, x)
+            case Static():
+                inner = self.add("Tanh", self.dense(block.inner, x))
+                return self.add("Add", x, self.dense(block.outer, inner))
+            case Lru():
+                return self.lru(block, x)
+            case Filtered():
+                return self.filtered(block, x)
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
 
     def dense(self, layer: Any, x: str) -> str:
@@ -97,6 +118,56 @@ class _Graph:
         around = x if part.through is None else self.dense(part.through, x)
         return self.add("Relu", self.add("Add", inner, around))
 
+    def entry(self, block: Entry, x: str) -> str:
+        axis = self.whole(2)
+        u = self.add("Slice", x, self.whole(0), self.whole(block.gated), axis)
+        measured = self.add("Slice", x, self.whole(-1), self.whole(2**31), axis)
+        return self.dense(block.full, self.add("Concat", x, self.add("Mul", u, measured), axis=2))
+
+    def recursion(self, v: str, a: Any) -> str:
+        """Add s(k) = A s(k-1) + v(k) from zero, v and s [B, T, S]; in double precision, as poles may be close to 1."""
+        from onnx import TensorProto, helper
+
+        v, name = self.add("Cast", v, to=TensorProto.DOUBLE), f"s{len(self.nodes)}"
+        shape = ["B", len(a)]
+        carried, now, new, out = (
+            helper.make_tensor_value_info(f"{name}_{part}", TensorProto.DOUBLE, shape)
+            for part in ("carried", "now", "new", "out")
+        )
+        moved = helper.make_node("MatMul", [carried.name, self.constant(a.T)], [f"{name}_moved"])
+        added = helper.make_node("Add", [moved.output[0], now.name], [new.name])
+        kept = helper.make_node("Identity", [new.name], [out.name])
+        body = helper.make_graph([moved, added, kept], f"{name}_body", [carried, now], [new, out])
+        first = self.add("Slice", v, self.whole(0), self.whole(1), self.whole(1))
+        zero = self.add("Mul", self.add("Squeeze", first, self.whole(1)), self.constant(np.float64(0)))
+        self.nodes.append(
+            helper.make_node("Scan", [zero, v], [f"{name}_last", name], body=body, num_scan_inputs=1,
+                             scan_input_axes=[1], scan_output_axes=[1])
+        )  # fmt: skip
+        return self.add("Cast", name, to=TensorProto.FLOAT)
+
+    def lru(self, block: Lru, x: str) -> str:
+        layer = block.recurrence
+        re, im = (np.diag(part.detach().cpu().double().numpy()) for part in layer.poles())
+        v = self.add("MatMul", x, self.weight(layer.entry().t()))
+        s = self.recursion(v, np.block([[re, -im], [im, re]]))
+        through = self.add("Mul", x, self.weight(layer.through))
+        y = self.add("Add", self.add("MatMul", s, self.weight(layer.weight_out.t())), through)
+        opening = self.add("Sigmoid", self.dense(block.gate, y))
+        return self.add("Add", x, self.add("Mul", self.dense(block.value, y), opening))
+
+    def filtered(self, block: Filtered, x: str) -> str:
+        """y(k) = b0 x(k) + s1(k-1), s1(k) = b1 x(k) - a1 y(k) + s2(k-1), s2(k) = b2 x(k) - a2 y(k), s2 behind s1."""
+        for num, den in block.filters.sections():
+            (b0, b1, b2), (a1, a2) = (part.detach().cpu().double().numpy() for part in (num, den))
+            n = len(b0)
+            a = np.block([[np.diag(-a1), np.eye(n)], [np.diag(-a2), np.zeros((n, n))]])
+            entry = np.concatenate((np.diag(b1 - a1 * b0), np.diag(b2 - a2 * b0)), axis=1)
+            s = self.recursion(self.add("MatMul", x, self.constant(entry.astype(np.float32))), a)
+            before = self.add("Pad", s, self.whole(0, 1, 0, 0, -1, -n))
+            x = self.add("Add", self.add("Mul", x, self.constant(b0.astype(np.float32))), before)
+        return x
+
     def scaled(self, x: str, scaling: Any) -> str:
         shifted = self.add("Sub", x, self.constant(np.array(scaling.middle)))
         return self.add("Cast", self.add("Div", shifted, self.constant(np.array(scaling.half))), to=1)
@@ -110,7 +181,7 @@ class _Graph:
         free = self.add("Sub", samples, n)
         pads = self.add("Concat", self.whole(0, 0, 0, 0), free, self.whole(0), axis=0)
         features = self.add("Concat", self.scaled("u", model.of_x), self.add("Pad", ones, pads), axis=2)
-        return self.add("Slice", self.block(model.trained, features), n, samples, self.whole(1))
+        return self.add("Slice", self.block(self.net, features), n, samples, self.whole(1))
 
     def windowed(self, model: Any) -> str:
         """Take the window before each sample; before the record its inputs stood still."""
@@ -130,7 +201,7 @@ class _Graph:
         rows = self.add("Unsqueeze", self.add("Range", *scalar, self.constant(np.int64(1))), one)  # [N, 1]
         which = self.add("Add", rows, self.constant(np.arange(window, dtype=np.int64)[None]))
         views = self.add("Reshape", self.add("Gather", padded, which, axis=1), self.whole(-1, window, inputs))
-        y = self.add("Gather", self.block(model.trained, views), self.constant(np.int64(window - 1)), axis=1)
+        y = self.add("Gather", self.block(self.net, views), self.constant(np.int64(window - 1)), axis=1)
         free = self.add("Sub", samples, n)
         batch = self.add("Slice", shape, zero, one, zero)
         outputs = self.whole(len(model.of_y.middle))
@@ -142,7 +213,7 @@ def build(model: Any) -> Any:
     import onnx
     from onnx import TensorProto, helper
 
-    graph, ny = _Graph(), len(model.of_y.middle)
+    graph, ny = _Graph(copy.deepcopy(model.trained).double()), len(model.of_y.middle)
     nu = len(model.of_x.middle) - model.windowed
     y = graph.windowed(model) if model.windowed else graph.stateful(model)
     half, middle = graph.constant(np.array(model.of_y.half)), graph.constant(np.array(model.of_y.middle))

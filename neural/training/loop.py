@@ -15,12 +15,15 @@ from torch import Tensor, nn
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.checkpoints import Checkpoint
 from simgap.neural.training.examples import Examples
+from simgap.neural.training.linear import Diagonal, Filters
 
 # Windows or pieces whose error is computed at once, after an epoch, and at the end: the paper's 24,160 to train on and
 # 5,400 to validate on are all among them.
 AT_ONCE = 256
 AFTER_AN_EPOCH = 6000
 AT_THE_END = 30_000
+# Weights that say how long a layer remembers: L2 would shorten that, and leaves them out.
+MEMORY = ("weight_hh", "nu", "theta", "gamma", "weight_den")
 
 
 class NotANumber(ArithmeticError):
@@ -33,7 +36,7 @@ class Recipe:
 
     patience: epochs without a better training loss before the rate is halved; early_stop: epochs without a better
     validation loss before training ends; the weights of the best validation loss are kept. l2 is the coefficient of
-    the squared weights of recurrent and convolutional layers that is added to the loss.
+    the squared weights of recurrent, convolutional and linear dynamic layers that is added to the loss.
     """
 
     epochs: int
@@ -62,10 +65,10 @@ class History:
 
 
 def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
-    """Make Adam with weight decay 2 l2, the gradient of l2 w^2, on input and convolution weights."""
+    """Make Adam with weight decay 2 l2, the gradient of l2 w^2, on input, convolution and filter weights."""
     decayed = {
-        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d)
-        for name, p in m.named_parameters() if not name.startswith("weight_hh")
+        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d | Diagonal | Filters)
+        for name, p in m.named_parameters() if not name.startswith(MEMORY)
     }  # fmt: skip
     groups = [
         {"params": [p for p in net.parameters() if id(p) in decayed], "weight_decay": 2 * recipe.l2},

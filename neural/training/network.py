@@ -46,12 +46,14 @@ class Network(ABC):
 
     stochastic: ClassVar[bool] = True
     parts: ClassVar = (Scaling,)  # records in a saved model
+    stateful: ClassVar[Recipe] = STATEFUL
+    free: ClassVar[int] = sequences.FREE  # samples of a free run in training, of records ten times as long
 
     mode: Literal["windowed", "stateful"] = "stateful"
     window: int = 40
     epochs: int = 30
     batches: int = 0
-    learning_rate: float = 0.0  # 0: 1e-4 windowed, 3e-3 stateful
+    learning_rate: float = 0.0  # 0: 1e-4 windowed; stateful 3e-3, or what the model says
     l2: float = 0.0
     dropout: float = 0.0
     resident: bool = True
@@ -76,7 +78,7 @@ class Network(ABC):
     @property
     def recipe(self) -> Recipe:
         """How this model is trained."""
-        usual = WINDOWED if self.windowed else STATEFUL
+        usual = WINDOWED if self.windowed else self.stateful
         return replace(usual, epochs=self.epochs, l2=self.l2, batches=self.batches or usual.batches,
                        learning_rate=self.learning_rate or usual.learning_rate)  # fmt: skip
 
@@ -119,7 +121,8 @@ class Network(ABC):
             self.inputs = 1 + nu
         else:
             n = data.n_init
-            examples = sequences.Sequences(data.train, self.of_x, self.of_y, n)
+            free = self.free if max(map(len, data.train)) >= 10 * self.free else sequences.FREE
+            examples = sequences.Sequences(data.train, self.of_x, self.of_y, n, free)
             held_out = sequences.Sequences(valid, self.of_x, self.of_y, n, *HELD_OUT)
             self.inputs = nu + ny + 1
         with torch.random.fork_rng(devices=[]):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from simgap.neural.training import steps
 from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual
+from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
 from simgap.neural.training.scaling import features
 from simgap.records import UnusableInput
@@ -18,7 +21,8 @@ from simgap.step_form import StepForm, source_of
 RECURRENT: dict[type, tuple[str, int]] = {Srnn: ("rnn", 1), Gru: ("gru", 1), Lstm: ("lstm", 2)}  # parts of a state
 LAYERS = (
     steps.sigmoid, steps.weighted, steps.dense, steps.rnn, steps.gru, steps.lstm, steps.remember, steps.convolution,
-    steps.mean_of_two, steps.add, steps.copy,
+    steps.mean_of_two, steps.add, steps.copy, steps.gated, steps.squash, steps.gate, steps.diagonal, steps.read_off,
+    steps.section,
 )  # fmt: skip
 STATEFUL = '''\
 def step(s: list, u: list, y: list):
@@ -100,6 +104,25 @@ class _Writer:
                 return x, nx
             case Parallel():
                 return self.parallel(block, x, nx)
+        return self.linear(block, x, nx)
+
+    def linear(self, block: Any, x: str, nx: int) -> tuple[str, int]:
+        """Write a block of `linear_blocks`."""
+        match block:
+            case Stacked():
+                for part in block.blocks:
+                    x, nx = self.block(part, x, nx)
+                return x, nx
+            case Entry():
+                y = self.array(nx + block.gated)
+                self.lines.append(f"gated({x}, {nx}, {block.gated}, {y})")
+                return self.dense(block.full, y, nx + block.gated)
+            case Static():
+                return self.static(block, x, nx)
+            case Lru():
+                return self.lru(block, x, nx)
+            case Filtered():
+                return self.filtered(block, x, nx)
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
 
     def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:
@@ -143,13 +166,44 @@ class _Writer:
         self.lines.append(f"add({z}, {wide}, {size}, {y}, 0)")
         return y, size
 
+    def static(self, block: Static, x: str, nx: int) -> tuple[str, int]:
+        inner, hidden = self.dense(block.inner, x, nx)
+        self.lines.append(f"squash({inner}, {hidden})")
+        outer, _ = self.dense(block.outer, inner, hidden)
+        y = self.array(nx)
+        self.lines.append(f"add({x}, {outer}, {nx}, {y}, 0)")
+        return y, nx
+
+    def lru(self, block: Lru, x: str, nx: int) -> tuple[str, int]:
+        layer = block.recurrence
+        entry = layer.entry()
+        states = len(entry)
+        v, at, y = self.array(states), self.take(states), self.array(nx)
+        gated, around = self.array(nx), self.array(nx)
+        weights = self.weights(entry, torch.zeros(states))
+        self.lines.append(f"dense({x}, {nx}, {v}, {states}, {weights}, 0)")
+        self.lines.append(f"diagonal({v}, s, {at}, {states // 2}, {self.weights(*layer.poles())})")
+        weights = self.weights(layer.weight_out, layer.through)
+        self.lines.append(f"read_off({x}, {nx}, s, {at}, {states}, {y}, {weights})")
+        value, opening = self.dense(block.value, y, nx)[0], self.dense(block.gate, y, nx)[0]
+        self.lines.append(f"gate({value}, {opening}, {nx}, {gated})")
+        self.lines.append(f"add({x}, {gated}, {nx}, {around}, 0)")
+        return around, nx
+
+    def filtered(self, block: Filtered, x: str, nx: int) -> tuple[str, int]:
+        for num, den in block.filters.sections():
+            y, at = self.array(nx), self.take(2 * nx)
+            self.lines.append(f"section({x}, {nx}, s, {at}, {y}, {self.weights(num, den)})")
+            x = y
+        return x, nx
+
 
 def step_form(model: Any, nu: int, ny: int) -> StepForm:
     """Write a trained network as a step; at rest its states are zero. Raises UnusableInput for unknown parts."""
     writer, inputs, window = _Writer(), model.inputs, model.window
     if model.windowed and window % 4 and any(isinstance(part, Pooled) for part in model.trained.modules()):
         raise UnusableInput(f"a window of {window} samples is no multiple of four, which a pooled one takes in a step")
-    y, _ = writer.block(model.trained, "x", inputs)
+    y, _ = writer.block(copy.deepcopy(model.trained).double(), "x", inputs)  # poles come out of single weights
     layers = "\n    ".join(
         ["def layers(s: list, x: list, y: list):", '"""Take the features x of a sample through the network."""',
          *writer.lines, f"copy({y}, {ny}, y, 0)"]

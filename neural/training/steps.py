@@ -104,3 +104,44 @@ def copy(x: list, n: int, y: list, at: int):
     """y[at], y[at + 1], .. = x."""
     for i in range(n):
         y[at + i] = x[i]
+
+
+def gated(x: list, nx: int, count: int, y: list):
+    """y = x and, behind it, its first `count` values times its last one."""
+    copy(x, nx, y, 0)
+    for i in range(count):
+        y[nx + i] = x[i] * x[nx - 1]
+
+
+def squash(x: list, n: int):
+    """x = tanh(x)."""
+    for i in range(n):
+        x[i] = math.tanh(x[i])
+
+
+def gate(x: list, z: list, n: int, y: list):
+    """y = x sigmoid(z)."""
+    for i in range(n):
+        y[i] = x[i] * sigmoid(z[i])
+
+
+def diagonal(v: list, s: list, at: int, n: int, re: list, im: list):
+    """s = lambda s + v, complex: the real parts of n states from s[at] on, then the imaginary ones."""
+    for i in range(n):
+        real = re[i] * s[at + i] - im[i] * s[at + n + i] + v[i]
+        s[at + n + i] = re[i] * s[at + n + i] + im[i] * s[at + i] + v[n + i]
+        s[at + i] = real
+
+
+def read_off(x: list, nx: int, s: list, at: int, n: int, y: list, w: list, through: list):
+    """y = W s + d x, of n numbers from s[at] on."""
+    for i in range(nx):
+        y[i] = weighted(i, s, at, n, w) + through[i] * x[i]
+
+
+def section(x: list, n: int, s: list, at: int, y: list, num: list, den: list):
+    """y(k) = b0 x(k) + b1 x(k-1) + b2 x(k-2) - a1 y(k-1) - a2 y(k-2) of n channels; their states from s[at] on."""
+    for i in range(n):
+        y[i] = num[i] * x[i] + s[at + i]
+        s[at + i] = num[n + i] * x[i] - den[i] * y[i] + s[at + n + i]
+        s[at + n + i] = num[2 * n + i] * x[i] - den[n + i] * y[i]

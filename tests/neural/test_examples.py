@@ -6,10 +6,12 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from simgap.neural.dynonet import DynoNet
+from simgap.neural.gru import GRU
 from simgap.neural.training.scaling import scalings
-from simgap.neural.training.sequences import Sequences
+from simgap.neural.training.sequences import FREE, Sequences
 from simgap.neural.training.windows import Windows
-from simgap.records import Experiment, UnusableInput
+from simgap.records import Experiment, TrainingSet, UnusableInput
 
 
 def numbered(name, first, length):
@@ -81,3 +83,11 @@ def test_a_piece_shows_outputs_only_while_the_state_is_found():
     np.testing.assert_allclose(
         of_y.outside(target.numpy())[:, 0, 0], of_u.outside(features.numpy()[:, 6, :1])[:, 0] + 0.5, atol=1e-4
     )
+
+
+@pytest.mark.parametrize(("samples", "length"), [(2999, 10 + FREE), (3000, 10 + DynoNet.free)])
+def test_long_pieces_are_for_records_ten_times_as_long(samples, length):
+    u = np.random.default_rng(0).standard_normal((samples, 1))
+    data = TrainingSet((Experiment("e", u, u, 0.1),), (), n_init=10)
+    assert DynoNet().prepare(data, 0)[0].length == length
+    assert GRU().prepare(data, 0)[0].length == 10 + FREE

@@ -52,7 +52,10 @@ def test_models_that_are_left_out_must_be_known(tmp_path):
         load_suite(str(path))
 
 
-NETWORKS = ("conv1d", "decoder", "encoder", "gru", "inception", "inception_regularised", "lstm", "srnn", "tcn", "tcns")
+NETWORKS = (
+    "conv1d", "decoder", "dynonet", "encoder", "gru", "inception", "inception_regularised", "lru", "lstm", "srnn",
+    "tcn", "tcns",
+)  # fmt: skip
 
 
 def test_the_groups_of_full_and_smoke_are_the_tables_that_stood_there():
