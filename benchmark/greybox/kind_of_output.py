@@ -132,12 +132,20 @@ class _Hypotheses:
 
     @property
     def _other(self) -> Hypothesis:
-        """Without a claim. Where the plain model of a kind fits alike, effects do the same for both."""
+        """Without a claim. High orders take long to extend, so that it is done only where it may tell more.
+
+        Where the plain model of a kind fits alike, effects do the same for both; where a kind with an effect beats a
+        plain model of high order, they do no better.
+        """
         plain = Hypothesis("other", self._baseline("other"))
-        estimate = plain.baseline.estimate
+        plant, estimate = plain.baseline.plant, plain.baseline.estimate
         for kind in self._with_claims:
             if kind.kind != "level" and _fit_alike(kind.baseline.estimate, estimate):
                 return replace(plain, larger=kind.larger)
+        if plant.order > 2 or plant.zeros:
+            judge, (*moving, other) = _judge([*self._with_claims, plain])
+            if any(s.lead is not None and s.beats(other, judge) for s in moving):
+                return plain
         return _extended(plain)
 
     @cached_property
