@@ -23,7 +23,7 @@ class GreyBox(GreyBoxModel):
 
     Order 1 for a velocity, 2 for a position, else what held-out data ask for up to 4; fitted by simulation error
     (Ljung 1999, section 4.2) from several starts, with the start state of every experiment estimated along.
-    effects: names of `simgap list effects`, "name:channel" where an effect can sit on several channels.
+    effects: names of `simgap list effects`, or one of them, "name:channel" where an effect can sit on several channels.
     """
 
     plants: list[FittedPlant] = field(default_factory=list, init=False, repr=False)
@@ -32,7 +32,8 @@ class GreyBox(GreyBoxModel):
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Fit the plain model, then add the effects one by one in the given order; nothing here is random."""
         self.plants = []
-        placed = [_place(name, data) for name in self.effects]
+        named = [self.effects] if isinstance(self.effects, str) else self.effects
+        placed = [_place(name, data) for name in named]
         for outputs in plants_of(data.channels):
             find = find_baseline if data.channels.plant is None else find_machine_baseline
             baseline = find(data.train, data.valid, data.channels, outputs, data.n_init)

@@ -158,6 +158,14 @@ def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):
     assert abs(estimated[-1 if effect in LAST else 0]) == pytest.approx(size, rel=0.03)
 
 
+def test_one_effect_is_named_without_a_list_too():
+    dataset = hide("cart", {"dead_zone": 1.0}, noise=0.0, seed=7)
+    listed, alone = (MODELS["greybox"](effects=effects) for effects in (["dead_zone"], "dead_zone"))
+    for model in (listed, alone):
+        model.fit(dataset.training, 0)
+    assert alone.plants[0].estimate.theta == pytest.approx(listed.plants[0].estimate.theta)
+
+
 @pytest.mark.parametrize("low", [-1.5, 0.3])
 @pytest.mark.parametrize("ends", [-1.0, -0.4, 0.0, 0.7, 1.0])
 @pytest.mark.parametrize("tilt", [-1.0, 0.0, 0.5, 1.0])

@@ -35,18 +35,7 @@ class InnerSaturation(InputEffect):
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"actuator_lag": (0,), "input_saturation": (2,)}
     refined: ClassVar[type[Effect] | None] = FilteredSaturation
     shows_in: ClassVar[tuple[ViewName, ...]] = ("amplitude", "input", "frequency band")
-    confounders: ClassVar[dict[str, str]] = {
-        "actuator_lag": "apply steps of several sizes: behind a lag alone all of them end in proportion to the input",
-        "input_saturation": (
-            "apply short pulses beyond the limit: a saturation behind a lag lets most of a short pulse pass, one "
-            "before it cuts every pulse"
-        ),
-        "rate_limit": "hold the largest input for long: an actuator of limited speed gets there in the end",
-        "sensor_saturation": (
-            "change the load at the largest input: a saturated reading does not move, the reading behind a saturated "
-            "actuator does"
-        ),
-    }
+    confounders: ClassVar[dict[str, str]] = FilteredSaturation.confounders
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the time constant, and the limits; each may lie out of reach."""
