@@ -231,26 +231,6 @@ class Simulator:
             self._drives[key] = u
         return self._drives[key]
 
-    def outputs(
-        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], states: Float[np.ndarray, "E T n"]
-    ) -> Float[np.ndarray, "E T ny"]:
-        """Read the sensors."""
-        plant = self.plant
-        reading = plant.reading(theta)
-        (seen,) = np.nonzero(reading.any(axis=0))
-        with np.errstate(over="ignore", invalid="ignore"):
-            one = reading.shape[0] == 1 and len(seen) == 1
-            y = states[:, :, seen] * reading[0, seen] if one else states @ reading.T
-        for channel in range(plant.ny):
-            for term in plant.on("output", channel):
-                if (power := term.effect.time_power) is not None:
-                    value = local[:, plant.local_index(term)]
-                    y[:, :, channel] += value[:, None] * self.t**power
-                else:
-                    assert isinstance(term.effect, OutputEffect)
-                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[plant.part_of(term)], self.t)
-        return y
-
     def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
         """Simulate the outputs; local holds the initial state and the per-experiment parameters."""
         return self.run_many(theta[None], local[None])[0]
