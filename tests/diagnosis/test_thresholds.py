@@ -7,7 +7,7 @@ import pytest
 
 from simgap.greybox import linear_rival, trial
 
-pytestmark = pytest.mark.slow  # they import every module of two rooms
+pytestmark = pytest.mark.slow  # they import every module of three rooms
 STUDY = runpy.run_path(str(Path(__file__).with_name("thresholds.py")))
 
 

@@ -18,6 +18,7 @@ from functools import cache
 from pathlib import Path
 
 import simgap.diagnosis
+import simgap.error_views
 import simgap.greybox
 from simgap.data import load
 from simgap.diagnosis.diagnose import diagnose
@@ -69,7 +70,7 @@ def threshold(module: str, name: str, factor: float) -> Iterator[float]:
 def _modules() -> list[object]:
     return [
         importlib.import_module(found.name)
-        for package in (simgap.greybox, simgap.diagnosis)
+        for package in (simgap.error_views, simgap.greybox, simgap.diagnosis)
         for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
     ]
 
