@@ -53,11 +53,12 @@ def score_tests(baseline: Baseline, estimate: Estimate, terms: Sequence[Term]) -
     """Test each of several effects beside a fitted model, as `score` does."""
     jacobian = baseline.problem(estimate.plant).jacobian(estimate.theta, estimate.local, estimate.plant.free)
     white = baseline.noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
-    return on_cores(partial(score, baseline, estimate, jacobian, NormalEquations.of(jacobian, white)), terms)
+    normal = NormalEquations.of(jacobian, white) if jacobian.finite else None
+    return on_cores(partial(score, baseline, estimate, jacobian, normal), terms)
 
 
 def score(
-    baseline: Baseline, estimate: Estimate, jacobian: Jacobian, normal: NormalEquations, term: Term
+    baseline: Baseline, estimate: Estimate, jacobian: Jacobian, normal: NormalEquations | None, term: Term
 ) -> list[Scored]:
     """Test each start of an effect: the log-likelihood it would gain, to first order, with theta and local numbers.
 
@@ -85,7 +86,7 @@ def score(
             else:
                 change = extended.simulator.run(theta, local) - without
         d = noise.whiten(np.where(baseline.train.mask[:, :, None], change, 0.0)).reshape(e.shape)
-        if not (jacobian.finite and 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE):
+        if normal is None or not 1 / LARGEST_SLOPE < np.max(np.abs(d)) < LARGEST_SLOPE:
             scored.append((0.0, theta, local))
             continue
         _, projected = normal.with_errors(jacobian, d).step(estimate.plant.free, 1e-9)
