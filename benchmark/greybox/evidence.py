@@ -161,8 +161,8 @@ class Evidence:
         plant, (low, high) = estimate.plant, self._intervals
         parameters = plant.parameters_of(term)
         if term in plant.per_experiment:
-            values = estimate.local[:, plant.local_index(term)]
-            spread, smallest, largest = np.sqrt(np.mean(values**2)), np.min(np.abs(values)), np.max(np.abs(values))
+            sizes = np.linalg.norm(estimate.local[:, plant.own_part_of(term)], axis=1)
+            spread, smallest, largest = np.sqrt(np.mean(sizes**2)), np.min(sizes), np.max(sizes)
             name = f"{parameters[0].name}, rms over experiments"
             return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
         part = plant.part_of(term)

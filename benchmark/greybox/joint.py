@@ -95,7 +95,7 @@ def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:
     theta, local = plant.carry(joint.plant, joint.estimate.theta, joint.estimate.local)
     for term in plant.terms:
         if term in plant.per_experiment:
-            local[:, plant.local_index(term)] = rigid.local[:, rigid.plant.local_index(term)]
+            local[:, plant.own_part_of(term)] = rigid.local[:, rigid.plant.own_part_of(term)]
         else:
             theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
     return joint.fit(plant.terms, [(theta, local)])

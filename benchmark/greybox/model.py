@@ -15,7 +15,7 @@ from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
 from simgap.greybox.machine import Machine
-from simgap.greybox.noise import Noise
+from simgap.greybox.noise import Noise, white
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
@@ -25,6 +25,9 @@ from simgap.greybox.terms import PlantScales, Term
 from simgap.greybox.uncertainty import Uncertainty, uncertainty
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
+
+
+OWN_STEPS = 5  # of the numbers of one experiment; one is enough where the output is linear in them
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,19 +139,37 @@ class FittedPlant:
         y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init][:, :, outputs])[0]
         if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
             return y_hat  # it grew without bound, which nothing of this experiment can mend
-        error = experiment.y[n_init:, outputs] - y_hat
-        t = experiment.dt * np.arange(n_init, len(experiment))
-        for j in range(len(outputs)):
-            powers = sorted(term.effect.time_power or 0 for term in plant.per_experiment if term.channel == j)
-            if powers:
-                columns = np.stack([t**power for power in powers], axis=1)  # [N, powers]
-                y_hat[:, j] += columns @ np.linalg.lstsq(columns, error[:, j], rcond=None)[0]
+        if plant.per_experiment:
+            y_hat = self._with_own(experiment, n_init)
         if self.outliers:
             error = experiment.y[n_init:, outputs] - y_hat
             flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
             for j in (outliers.output for outliers in self.outliers):
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat
+
+    def _with_own(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+        """Simulate with the numbers of this experiment that suit all of it best (Gauss-Newton), from the same start."""
+        plant, theta, outputs = self.estimate.plant, self.estimate.theta, list(self.outputs)
+        u, y = experiment.u[None], experiment.y[None][:, :, outputs]
+        _, local = plant.carry(self.forecasting, theta, self.start(u, y[:, :n_init]))
+        measured = Records.measured(u, y, plant.dt)
+        later = np.arange(len(experiment))[None] >= n_init
+        problem = Problem(plant, replace(measured, mask=later), white(self.noise.deviations))
+        own, of_none = slice(plant.n_start, plant.n_local), np.zeros(plant.size, dtype=bool)
+        errors = problem.errors(theta, local)
+        for _ in range(OWN_STEPS):
+            slopes = problem.jacobian(theta, local, of_none)
+            if not slopes.finite:
+                break
+            target = problem.noise.whiten(errors).ravel()
+            attempt = local.copy()
+            attempt[0, own] += np.linalg.lstsq(slopes.local[own, 0].T, target, rcond=None)[0]
+            errors_then = problem.errors(theta, attempt)
+            if not np.sum(errors_then**2) < np.sum(errors**2):
+                break
+            local, errors = attempt, errors_then
+        return problem.simulator.run(theta, local)[0, n_init:]
 
     def log_likelihood(self) -> float:
         """Compute the log-likelihood of the errors as white noise, up to a constant."""

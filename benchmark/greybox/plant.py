@@ -90,7 +90,7 @@ class Plant:
             return True
         if not isinstance(effect, InputEffect) or not self.machine.controlled:
             known = bool(self.machine.known.gravity) and effect.replaces_spring
-            return not known and effect.time_power is None
+            return not known and not effect.own
         return effect.on_command if channel == self.nu else effect.on_goal
 
     @property
@@ -158,8 +158,9 @@ class Plant:
 
     @cached_property
     def per_experiment(self) -> tuple[Term, ...]:
-        """Terms whose parameters are estimated anew in every experiment."""
-        return tuple(term for term in self.terms if term.effect.time_power is not None)
+        """Terms whose parameters are estimated anew in every experiment, those that move the states first."""
+        found = [term for term in self.terms if term.effect.own]
+        return tuple(sorted(found, key=lambda term: term.effect.port == "output"))
 
     @property
     def n_start(self) -> int:
@@ -173,14 +174,26 @@ class Plant:
         ports = ("input", "force") if self.imposed else ("input",)
         return tuple(term for port in ports for term in found if term.effect.port == port)
 
+    @cached_property
+    def n_moving(self) -> int:
+        """Numbers of an experiment that move its states: the initial state, then the forces of its own."""
+        return self.n_start + sum(term.effect.own for term in self.per_experiment if term.effect.port == "force")
+
     @property
     def n_local(self) -> int:
-        """Numbers estimated in every experiment: the initial state, then one for each term of its own."""
-        return self.n_start + len(self.per_experiment)
+        """Numbers estimated in every experiment: the initial state, then those of its own terms."""
+        return self.n_start + self.n_own
 
-    def local_index(self, term: Term) -> int:
-        """Return where the parameter of a per-experiment term stands among the numbers of an experiment."""
-        return self.n_start + self.per_experiment.index(term)
+    @cached_property
+    def n_own(self) -> int:
+        """Numbers that the terms have in every experiment."""
+        return sum(term.effect.own for term in self.per_experiment)
+
+    def own_part_of(self, term: Term) -> slice:
+        """Return where the numbers of a per-experiment term stand among those of an experiment."""
+        before = self.per_experiment[: self.per_experiment.index(term)]
+        start = self.n_start + sum(other.effect.own for other in before)
+        return slice(start, start + term.effect.own)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -247,7 +260,7 @@ class Plant:
             if term not in smaller.terms:
                 continue
             if term in self.per_experiment:
-                numbers[:, self.local_index(term)] = local[:, smaller.local_index(term)]
+                numbers[:, self.own_part_of(term)] = local[:, smaller.own_part_of(term)]
             else:
                 carried[self.part_of(term)] = theta[smaller.part_of(term)]
         return carried, numbers

@@ -161,8 +161,12 @@ class Problem:
         # Towards the middle: on its other side a memory may be out of reach, and change nothing.
         memories = slice(plant.order, plant.n_start)
         steps[memories] = np.where(local[:, memories] > 0, -DIFFERENCE, DIFFERENCE).T
-        for i, term in enumerate(plant.per_experiment, start=plant.n_start):
-            steps[i] = self._sizes[term.channel] / self.records.duration
+        for term in plant.per_experiment:
+            size = self._sizes[term.channel] / self.records.duration
+            if term.effect.port == "force":
+                assert plant.scales is not None
+                size = DIFFERENCE * plant.scales.of(term).force_rms
+            steps[plant.own_part_of(term)] = size
         return steps
 
     def sizes(self, theta: np.ndarray) -> Float[np.ndarray, " p"]:

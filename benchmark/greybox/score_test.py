@@ -31,7 +31,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
     listed = []
     for name in EFFECTS.names():
         effect = EFFECTS[name]()
-        if not effect.simulated or name in contained or (effect.time_power is not None and not baseline.repeated):
+        if not effect.simulated or name in contained or (effect.own and not baseline.repeated):
             continue
         channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
         on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]
@@ -45,8 +45,10 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
 
 def _has_room(term: Term, terms: Sequence[Term]) -> bool:
     """Tell whether the compiled loop has room for this force beside those of other terms."""
-    beside = [other for other in terms if other.effect.port == "force" and not term.replaces(other)]
-    return term.effect.port != "force" or len(beside) < SLOTS
+    def in_loop(one: Term) -> bool:
+        return one.effect.port == "force" and not one.effect.own
+
+    return not in_loop(term) or sum(in_loop(other) and not term.replaces(other) for other in terms) < SLOTS
 
 
 def score_tests(baseline: Baseline, estimate: Estimate, terms: Sequence[Term]) -> list[list[Scored]]:

@@ -83,7 +83,12 @@ class Simulator:
             self._of_drive[part] = True
         self._drives: dict[bytes, np.ndarray] = {}
         self._known = b"", np.empty((0, *u.shape[:2], 1))  # the states [1, E, T, n] of what was simulated last
-        forces = sorted(plant.on("force"), key=lambda term: ROLES.index(term.effect.role))
+        self._duration = plant.dt * u.shape[1]
+        middles = self.h * (np.arange(self._u.shape[2]) + 0.5)  # of the substeps
+        drifts = [term for term in plant.per_experiment if term.effect.port == "force"]
+        self._drifts = [(term, term.effect.shapes(middles, self._duration)) for term in drifts]
+        forces = [term for term in plant.on("force") if term not in drifts]
+        forces.sort(key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
         acting: list[Any] = [term.effect for term in forces]
@@ -165,7 +170,8 @@ class Simulator:
     def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
         """Compute the forces that the motion takes, and the rates of the drive."""
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
-        begun[:, self._remembered] = np.clip(start[:, start.shape[1] - len(self._remembered) :], -1.0, 1.0)
+        n = self.plant.n_start
+        begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
         drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
         follow_motion_directly(
             drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
@@ -180,13 +186,16 @@ class Simulator:
         if self.plant.imposed:
             x = self.arriving(theta, 0, local)
             return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
-        states = self.states(theta[None], local[None, :, : self.plant.n_start])[0]
+        states = self.states(theta[None], local[None, :, : self.plant.n_moving])[0]
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
     def drive(
         self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
     ) -> Float[np.ndarray, "E K"]:
-        """Compute b u + d after the actuators' effects, for every substep; `start` is what these remember."""
+        """Compute b u + d after the actuators' effects, for every substep, and the drifts of the load.
+
+        `start` is what the terms remember, then the numbers of each drift.
+        """
         plant = self.plant
         if plant.machine is not None:
             return self._torque(theta)
@@ -196,6 +205,9 @@ class Simulator:
             arriving = self.arriving(theta, channel, start)
             for tap, gain in zip(plant.taps, of_channel, strict=True):
                 total += gain * shifted(arriving, tap * self.substeps)
+        for term, shapes in self._drifts if start is not None else ():
+            part = plant.own_part_of(term)
+            total += start[:, part.start - plant.order : part.stop - plant.order] @ shapes
         return total
 
     def _torque(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
@@ -240,7 +252,7 @@ class Simulator:
     ) -> Float[np.ndarray, "S E T ny"]:
         """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
         plant = self.plant
-        moving, starts = thetas[:, plant.moves_states], locals_[:, :, : plant.n_start]
+        moving, starts = thetas[:, plant.moves_states], locals_[:, :, : plant.n_moving]
         keys = [of_run.tobytes() + start.tobytes() for of_run, start in zip(moving, starts, strict=True)]
         known, states_known = self._known
         row_of = {key: row for row, key in enumerate(keys) if key != known}
@@ -265,9 +277,8 @@ class Simulator:
         plant = self.plant
         for channel in range(plant.ny):
             for term in plant.on("output", channel):
-                if (power := term.effect.time_power) is not None:
-                    value = local[:, plant.local_index(term)]
-                    y[:, :, channel] += value[:, None] * self.t**power
+                if term.effect.own:
+                    y[:, :, channel] += local[:, plant.own_part_of(term)] @ term.effect.shapes(self.t, self._duration)
                 else:
                     assert isinstance(term.effect, OutputEffect)
                     y[:, :, channel] = term.effect.term(y[:, :, channel], theta[plant.part_of(term)], self.t)

@@ -15,7 +15,7 @@ SUBSTEP = 0.025
 def effects_of(base):
     every = [EFFECTS[name]() for name in EFFECTS]
     every += [effect.refined() for effect in every if effect.refined]
-    return [e for e in every if isinstance(e, base) and e.simulated and e.time_power is None]
+    return [e for e in every if isinstance(e, base) and e.simulated and not e.own]
 
 
 def stepped(effect, values, x, h, memory=0.0):
@@ -51,5 +51,5 @@ def test_a_reading_is_the_same_sample_by_sample(effect):
 def test_every_effect_that_is_simulated_is_forecast_or_has_a_step():
     for name in EFFECTS:
         effect = EFFECTS[name]()
-        if effect.port != "force" and effect.simulated and effect.time_power is None:
+        if effect.port != "force" and effect.simulated and not effect.own:
             assert callable(effect.step), name

@@ -136,8 +136,9 @@ class Effect(ABC):
     late_place: ClassVar[int | None] = None  # where else it may stand, if the records say so
     # Its parameters belong to one experiment and cannot be forecast.
     per_experiment: ClassVar[bool] = False
-    # Adds value * t^power to the reading, with a value of its own in every experiment; None: no such effect.
-    time_power: ClassVar[int | None] = None
+    # So many numbers are estimated anew in every experiment: it adds each times one of its `shapes` to the reading, or
+    # to the forces.
+    own: ClassVar[int] = 0
     # False when it cannot be simulated and is found in the errors instead.
     simulated: ClassVar[bool] = True
     # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.
@@ -178,6 +179,11 @@ class Effect(ABC):
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the effect makes sense on such a plant."""
         return True
+
+    @staticmethod
+    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+        """Return what each of its own numbers adds [own, T] at the times t [T] of a record, both in s."""
+        raise NotImplementedError
 
     def describe(self, values: dict[str, float]) -> str:
         """Say what was found in the words of an engineer, with the estimated values."""

@@ -23,7 +23,7 @@ class SensorBias(OutputEffect):
         "encoder that counts from wherever it was switched on."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
-    time_power: ClassVar[int | None] = 0
+    own: ClassVar[int] = 1
     shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
@@ -41,6 +41,11 @@ class SensorBias(OutputEffect):
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the reading has a zero of its own; that of any other quantity is its operating point."""
         return scales.kind != "other"
+
+    @staticmethod
+    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+        """Return 1."""
+        return np.ones((1, len(t)))
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

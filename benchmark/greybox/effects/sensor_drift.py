@@ -23,7 +23,7 @@ class SensorDrift(OutputEffect):
         "creeping load cell."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
-    time_power: ClassVar[int | None] = 1
+    own: ClassVar[int] = 1
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since the start", "drift within experiment")
     per_experiment: ClassVar[bool] = True
 
@@ -41,6 +41,11 @@ class SensorDrift(OutputEffect):
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from a slow drift; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms / scales.duration,), amplitude=0)]
+
+    @staticmethod
+    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+        """Return t."""
+        return t[None]
 
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:

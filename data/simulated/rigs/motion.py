@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import inf
 
 import numpy as np
@@ -19,10 +19,15 @@ INNER_LAG = 5.0  # samples, of the lag before a limit
 
 
 def simulate_motion(
-    rig: Rig, size: Mapping[str, float], u: np.ndarray, start_rng: Generator, missing_rng: Generator, substeps: int
+    rig: Rig, size: Mapping[str, float], u: np.ndarray, rngs: Sequence[Generator], substeps: int
 ) -> Float[np.ndarray, "n ny"]:
-    """Integrate the true outputs [T substeps, ny] under the input u [T], from an initial state that is drawn."""
+    """Integrate the true outputs [T substeps, ny] under the input u [T].
+
+    What is drawn: the initial state, the input that is missing, and the slope of the load, each from its own generator.
+    """
+    start_rng, missing_rng, load_rng = rngs
     other = size.get("missing", 0.0) * _band(len(u) + 1, missing_rng)  # [T + 1]
+    other += size.get("load_slope", 0.0) * load_rng.standard_normal() * rig.dt * np.arange(len(other))
     known = {"amplitude": rig.largest_input, "limit": size.get("limit", inf), "rate": size.get("rate", inf)}
     if "inner_limit" in size:  # and a lag before it
         known["lag"] = INNER_LAG * rig.dt if size["inner_limit"] < inf else 0.0
