@@ -30,8 +30,8 @@ class Machine:
 
     def record(self, u: np.ndarray, noise: float, seed: tuple[int, ...]) -> Experiment:
         """Take a record under the input u [T]; the initial state and the noise are drawn from the seed."""
-        start, other, of_noise = np.random.default_rng(seed).spawn(3)
-        motion = simulate_motion(self.rig, self.hidden, u, start, other, SUBSTEPS)
+        start, other, of_noise, load = np.random.default_rng(seed).spawn(4)
+        motion = simulate_motion(self.rig, self.hidden, u, (start, other, load), SUBSTEPS)
         y = measure(self.rig, self.hidden, motion, np.full(motion.shape[1], noise), 0.0, of_noise, SUBSTEPS)
         return Experiment("e" + "_".join(map(str, seed)), u[:, None], y, self.rig.dt)
 
@@ -79,7 +79,7 @@ class Twins:
         for draw in range(500):
             u = draw_input(rig, KINDS[rng.integers(len(KINDS))], rng)
             u *= size * (np.sqrt(power / np.mean(u**2)) if power else 1.0)
-            y = simulate_motion(machine.rig, machine.hidden, u, *np.random.default_rng(0).spawn(2), SUBSTEPS)[:, 0]
+            y = simulate_motion(machine.rig, machine.hidden, u, np.random.default_rng(0).spawn(3), SUBSTEPS)[:, 0]
             if np.max(np.abs(y)) <= self.travel:
                 return u
             size *= 0.9 if draw >= 50 else 1.0

@@ -131,7 +131,7 @@ def test_units_follow_from_what_the_output_measures(kind, unit, order, force, ra
 
 # What a rig calls the size of an effect is the first number of the effect, but for these.
 SIZE = {"gain_fade": lambda size, dataset: size / (300 * dataset.training.dt)}
-NO_SIZE = {"absolute_sensor", "sensor_drift", "sensor_bias", "curved_sensor"}
+NO_SIZE = {"absolute_sensor", "load_drift", "sensor_drift", "sensor_bias", "curved_sensor"}
 LAST = {"sensor_saturation", "inner_saturation", "load_friction", "hard_stop"}
 
 

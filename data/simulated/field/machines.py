@@ -31,7 +31,6 @@ class Rig:
     name: str
     draw: Callable[[Generator], Plant]
     effects: tuple[str, ...]
-    outside: tuple[str, ...] = ()  # that no diagnosis knows by name
 
 
 def log_uniform(rng: Generator, low: float, high: float) -> float:
@@ -164,7 +163,7 @@ RIGS = {
         Rig("two_forces", two_forces, ("input_saturation", "dead_zone", "input_delay", "coulomb_friction")),
         Rig("heater_fan", heater_fan, ("input_saturation", "input_delay", "backlash")),
         *(
-            Rig(name, lambda rng, closed=closed: valve(rng, closed), ("valve_stiction", "backlash"), ("load_drift",))
+            Rig(name, lambda rng, closed=closed: valve(rng, closed), ("valve_stiction", "backlash", "load_drift"))
             for name, closed in (("valve", False), ("valve_loop", True))
         ),
     )

@@ -13,8 +13,8 @@ ANGLES = ((0.0, 0.05), (0.25, 0.8), (0.5, 1.2), (1.0, 2.0))  # rad, that a pendu
 
 
 def suitable(rig: str, outside: bool = False) -> tuple[str, ...]:
-    """List the effects that make sense on a machine: those of the catalogue, or those outside of it."""
-    return RIGS[rig].outside if outside else RIGS[rig].effects
+    """List the effects that make sense on a machine; none of them is outside of the catalogue."""
+    return () if outside else RIGS[rig].effects
 
 
 def largest_angle(strength: float) -> float:
