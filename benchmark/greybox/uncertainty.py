@@ -15,6 +15,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 
 BLOCKS = 40
+MOST = 0.999  # of what tells a number: the share of one block
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,11 @@ class Uncertainty:
 def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertainty | None:
     """Compute it, honest for coloured errors and for what the model cannot explain; None where no slope is finite.
 
-    cov = H^-1 (sum over blocks of g g') H^-1, g = J' e of a block (Liang and Zeger 1986).
+        cov = H^-1 (sum over blocks of g g') H^-1,   g = J' (I - P)^-1/2 e of a block
+
+    P is the block's share of the projection onto all slopes: where a few samples tell most of a number, the fit has
+    made their errors small (Liang and Zeger 1986; Bell and McCaffrey, Survey Methodology 28, 2002, CR2). Where so few
+    blocks tell it that their sum is chance, it is smaller than the s^2 H^-1 of white errors, and then that counts.
     """
     plant, theta = estimate.plant, estimate.theta
     jacobian = Problem(plant, records, noise).jacobian(theta, estimate.local, plant.free)
@@ -42,16 +47,35 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
         return None
     normal = NormalEquations.of(jacobian, white)
     h, weights = normal.reduced(0.0)
-    # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
-    own = jacobian.theta - np.einsum("eqp,qem->pem", weights, jacobian.local)
-    per_record = max(1, -(-BLOCKS // len(white)))
-    parts = np.array_split(own * white, per_record, axis=2)
-    g = np.concatenate([part.sum(axis=2).T for part in parts])  # [blocks, p]
     inside = plant.free & (np.diag(normal.h) > 0)
     scale = np.sqrt(np.diag(normal.h)[inside])  # which directions the data tell does not depend on the units
-    inverse = np.linalg.pinv(h[np.ix_(inside, inside)] / scale / scale[:, None], rcond=1e-12, hermitian=True)
-    used = len(g) / max(1, len(g) - 1)
-    moved = (g[:, inside] / scale) @ inverse
+    # The slopes of theta when the per-experiment numbers follow: J - K (K'K)^-1 K'J.
+    own = jacobian.theta[inside] - np.einsum("eqp,qem->pem", weights[:, :, inside], jacobian.local)
+    own /= scale[:, None, None]
+    root, of_own = _inverse_root(h[np.ix_(inside, inside)] / scale / scale[:, None]), _inverse_root(normal.blocks)
+    columns = np.einsum("pem,pr->erm", own, root), np.einsum("qem,eqr->erm", jacobian.local, of_own)
+    projected = np.concatenate(columns, axis=1)  # P = A' A, A [E, r, M]
+    g = []
+    for at in np.array_split(np.arange(white.shape[1]), max(1, -(-BLOCKS // len(white)))):
+        a = projected[:, :, at]
+        share, along = np.linalg.eigh(a @ a.swapaxes(1, 2))
+        of_block = (along.swapaxes(1, 2) @ (a @ white[:, at, None]))[:, :, 0]
+        of_block /= np.sqrt(1 - np.minimum(share, MOST))
+        g.append((along @ of_block[:, :, None])[:, : len(root), 0])
+    moved = np.concatenate(g) @ root / scale  # [blocks, p]
+    freedom = max(1, records.samples * plant.ny - int(inside.sum()) - estimate.local.size)
+    of_white = float(np.vdot(white, white)) / freedom * np.sum((root / scale) ** 2, axis=0)
+    of_blocks = np.sum(moved**2, axis=0)
+    wider = np.sqrt(np.maximum(1.0, of_white / np.where(of_blocks > 0, of_blocks, np.inf)))
     covariance = np.zeros((len(theta), len(theta)))
-    covariance[np.ix_(inside, inside)] = used * (moved.T @ moved) / scale / scale[:, None]
-    return Uncertainty(covariance, max(2, len(g) - 1))
+    covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider)
+    return Uncertainty(covariance, max(2, len(moved) - 1))
+
+
+def _inverse_root(h: Float[np.ndarray, "... n n"]) -> Float[np.ndarray, "... n n"]:
+    """Compute h^-1/2, without the directions in which h is nothing."""
+    size, along = np.linalg.eigh(h)
+    least = 1e-12 * np.max(size, axis=-1, initial=0.0, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.where(size > least, size**-0.5, 0.0)
+    return (along * root[..., None, :]) @ along.swapaxes(-1, -2)

@@ -3,6 +3,11 @@
 import numpy as np
 import pytest
 from scipy.stats import binom
+from twins import PAIRS, with_record
+
+from simgap.greybox.intervals import intervals as ends_of
+from simgap.greybox.machine import NAMES
+from simgap.registry import MODELS
 
 from .building import plain_search, plant_with_interval
 from .parts import experiments
@@ -48,3 +53,22 @@ def test_an_interval_shrinks_with_the_root_of_the_samples():
     search = plain_search(made[:3], made[3:4], "velocity")
     widths = [np.subtract(*plant_with_interval(search, made[:n])[:0:-1]) for n in (16, 64)]
     np.testing.assert_allclose(widths[0] / widths[1], 2.0, rtol=0.35)  # a width from 40 blocks is known to 11 %
+
+
+def test_the_intervals_of_a_machine_hold_the_truth_where_one_short_record_tells_most():
+    """Two weak records and one lively one: the fit makes the few errors small that tell most of gain and inertia."""
+    twins, held = PAIRS["motor or arm"], np.zeros(3)
+    for seed in range(SEEDS):
+        truth, _ = twins.names(seed)
+        machine, data = twins.machines[truth], twins.at_hand(twins.machines[truth], seed)
+        lively = twins.usual_input(machine, 80, 3.0, np.random.default_rng([2, seed]))
+        data = with_record(data, machine.record(lively, twins.noise, (3, seed)))
+        model = MODELS["greybox"](effects=())
+        model.fit(data.training, seed)
+        plant = model.plants[0]
+        total = {"gain": 1.0, "inertia": 8 / 6}[truth]  # kg m^2, of which the known mass on its arm makes 0.5
+        true = np.array([total - 0.5, machine.rig.damping * total, machine.rig.gain * total])
+        at = [NAMES.index("inertia"), NAMES.index("damping"), plant.estimate.plant.layout.gains.start]
+        low, high = ends_of(plant)
+        held += (low[at] <= true) & (high[at] >= true)
+    assert (held >= binom.ppf(1e-4, SEEDS, 0.95)).all(), held
