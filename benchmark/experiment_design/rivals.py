@@ -16,7 +16,7 @@ from simgap.greybox.intervals import intervals
 from simgap.greybox.machine import ARM, INERTIA, MASS, NAMES
 from simgap.greybox.noise import Noise
 from simgap.greybox.noise import estimate as noise_of
-from simgap.greybox.normal_equations import NormalEquations
+from simgap.greybox.normal_equations import NormalEquations, scales_of
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
@@ -56,6 +56,22 @@ class Rival:
         plant = self.plant
         _, local = plant.carry(self.estimate.plant, self.estimate.theta, self.estimate.local)
         return np.repeat(local.mean(axis=0, keepdims=True), experiments, axis=0)
+
+    def drawn(self, count: int) -> list[Rival]:
+        """Draw models from what the records leave open of the numbers, from a fixed seed.
+
+        Directions of which they tell nothing stay as they are.
+        """
+        plant, theta = self.estimate.plant, self.estimate.theta
+        scale = scales_of(np.diag(self.information))
+        size, along = np.linalg.eigh(self.information / scale / scale[:, None])
+        told = size > NOTHING
+        normal = np.random.default_rng(0).standard_normal((count, int(told.sum())))
+        moved = (normal / np.sqrt(size[told])) @ along[:, told].T / scale
+        return [
+            replace(self, estimate=replace(self.estimate, theta=np.clip(theta + by, plant.low, plant.high)))
+            for by in moved
+        ]
 
 
 @dataclass(frozen=True, eq=False)

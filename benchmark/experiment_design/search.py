@@ -20,6 +20,7 @@ BEST = 6  # shapes from which others are varied
 VARIANTS = 8  # of each
 ROUNDS = 5
 ROWS = 4  # of inputs that do not move, which the grid tries
+DRAWS = 16  # of the numbers of each rival, that a record must stay within the travel with
 REFITTED = 3  # of the best, whose separation is computed by a fit
 
 
@@ -136,10 +137,11 @@ def _ranked(
 def _reach(
     questions: Sequence[Question], u: np.ndarray, limits: Limits
 ) -> tuple[Float[np.ndarray, "E ny"], Float[np.ndarray, "E ny"]]:
-    """Find the lowest and the highest that any rival expects of each output."""
+    """Find the lowest and the highest that any rival expects of each output, as far as its numbers are known."""
     low, high = np.full((2, len(u), len(limits.travel_low)), np.nan)
     for question in questions:
-        runs = np.stack([simulate(rival, u) for rival in question.rivals])  # [r, E, T, ny]
+        likely = [one for rival in question.rivals for one in (rival, *rival.drawn(DRAWS))]
+        runs = np.stack([simulate(one, u) for one in likely])  # [r, E, T, ny]
         runs = np.nan_to_num(runs, nan=np.inf)
         low[:, list(question.outputs)] = runs.min(axis=(0, 2))
         high[:, list(question.outputs)] = runs.max(axis=(0, 2))

@@ -26,7 +26,6 @@ from simgap.greybox.uncertainty import Uncertainty, uncertainty
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import LARGEST_VALUE, Experiment
 
-
 OWN_STEPS = 5  # of the numbers of one experiment; one is enough where the output is linear in them
 
 

@@ -45,6 +45,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
 
 def _has_room(term: Term, terms: Sequence[Term]) -> bool:
     """Tell whether the compiled loop has room for this force beside those of other terms."""
+
     def in_loop(one: Term) -> bool:
         return one.effect.port == "force" and not one.effect.own
 

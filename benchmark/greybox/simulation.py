@@ -205,7 +205,9 @@ class Simulator:
             arriving = self.arriving(theta, channel, start)
             for tap, gain in zip(plant.taps, of_channel, strict=True):
                 total += gain * shifted(arriving, tap * self.substeps)
-        for term, shapes in self._drifts if start is not None else ():
+        if start is None:
+            return total
+        for term, shapes in self._drifts:
             part = plant.own_part_of(term)
             total += start[:, part.start - plant.order : part.stop - plant.order] @ shapes
         return total

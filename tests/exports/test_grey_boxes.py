@@ -43,9 +43,7 @@ def plants_for(effect):
 
 
 # One that acts on the command of a controller inside has no plant here: such machines are not exported.
-FORECAST = [
-    name for name in EFFECTS if EFFECTS[name].simulated and not EFFECTS[name].own and plants_for(name)
-]
+FORECAST = [name for name in EFFECTS if EFFECTS[name].simulated and not EFFECTS[name].own and plants_for(name)]
 
 
 def check_on(plant, effect):

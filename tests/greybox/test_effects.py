@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from simgap.data.simulated.rigs import CATALOGUE, hide, physical, suitable
+from simgap.data.simulated.rigs import CATALOGUE, RIGS, hide, physical, suitable
 from simgap.error_views.views import views
 from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
 from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.effects.load_drift import LoadDrift
 from simgap.greybox.evidence import separation
 from simgap.records import Channel, Channels, Experiment, Kind
 from simgap.registry import EFFECTS, MODELS
@@ -226,3 +227,30 @@ def test_an_actuator_of_limited_speed_is_late_by_what_it_could_not_do_and_no_mor
     assert mean[13:16] == pytest.approx(1.0)
     assert mean[16:36] == pytest.approx(0.95 - 0.1 * np.arange(20))
     assert mean[36:] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("rig", ["cart", "tank"])
+def test_the_course_of_a_load_that_drifts_is_found_in_every_experiment(rig):
+    dataset = hide(rig, {"load_drift": 1.0}, noise=0.01, seed=7)
+    model = MODELS["greybox"](effects=("load_drift",))
+    model.fit(dataset.training, 0)
+    fitted, place = model.plants[0], list(RIGS).index(rig)
+    t = fitted.records.dt * np.arange(300)
+    loads = fitted.estimate.local[:, fitted.estimate.plant.n_start :] @ LoadDrift.shapes(t, fitted.records.duration)
+    # The slopes as the rig draws them: the last of five generators of each place in training and validation.
+    places = [(split, i) for split, count in enumerate((8, 4)) for i in range(count)]
+    draws = [np.random.default_rng([place, 7, *at]).spawn(5)[4].standard_normal() for at in places]
+    true = physical(rig, {"load_drift": 1.0})["load_drift"] * np.array(draws)[:, None] * t
+    offset = loads.mean(axis=1, keepdims=True) - true.mean(axis=1, keepdims=True)  # what the operating point takes
+    assert np.sqrt(np.mean((loads - true - offset) ** 2)) < 0.1 * np.sqrt(np.mean(true**2))
+
+
+def test_what_one_experiment_alone_has_is_estimated_from_it_and_never_forecast():
+    dataset = hide("tank", {"load_drift": 1.0}, noise=0.02, seed=7)
+    model = MODELS["greybox"](effects=("load_drift",))
+    model.fit(dataset.training, 0)
+    x, n = dataset.test[0], dataset.n_init
+    forecast = model.simulate(x.u[None], x.y[None, :n])[0]
+    anew = model.simulate_anew(x, n)
+    errors = [np.std(x.y[n:] - y_hat) for y_hat in (anew, forecast)]
+    assert errors[0] < 0.5 * errors[1]

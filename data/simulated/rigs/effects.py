@@ -37,9 +37,7 @@ CATALOGUE = {
     "torque_foldback": Hidden("fold", "Y, error of the controller", None, None, None, None, None, None, 0.15),
     "gain_fade": Hidden("fade", "share lost at the end", 0.7, 0.7, 0.7, 0.2, 0.2),
     "constant_load": Hidden("load", "L/s^2", 0.5, 50.0, 7.0, None, None),
-    "load_drift": Hidden(
-        "load_slope", "L/s^3, tanks L/s^2, standard deviation", 0.032, 5.0, 0.3, 8e-5, 5.6e-5, 0.25
-    ),
+    "load_drift": Hidden("load_slope", "L/s^3, tanks L/s^2, standard deviation", 0.032, 5.0, 0.3, 8e-5, 5.6e-5, 0.25),
     "coulomb_friction": Hidden("coulomb", "L/s^2", 0.6, 50.0, 10.0, None, None, 3.0, 20.0),
     "stribeck_friction": Hidden("stribeck", "L/s^2 at high speed", 0.4, 40.0, 8.0, None, None),
     "load_friction": Hidden("load_share", "share of the load", 0.3, 0.3, 0.3, None, None),

@@ -40,7 +40,9 @@ def hide(
     places = [(split, number) for split, count in enumerate(counts) for number in range(count)]
     streams = [default_rng([list(RIGS).index(rig), seed, *place]).spawn(5) for place in places]
     inputs = [draw_input(plant, KINDS[place[1] % len(KINDS)], s[0]) for place, s in zip(places, streams, strict=True)]
-    motions = [simulate_motion(plant, size, u, (s[1], s[2], s[4]), substeps) for u, s in zip(inputs, streams, strict=True)]
+    motions = [
+        simulate_motion(plant, size, u, (s[1], s[2], s[4]), substeps) for u, s in zip(inputs, streams, strict=True)
+    ]
     spread = np.std(np.concatenate([motion[::substeps] for motion in motions]), axis=0)  # [ny]
     records = []
     for number, (u, motion, stream) in enumerate(zip(inputs, motions, streams, strict=True)):
