@@ -124,7 +124,7 @@ def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, speci
 def _cost(baseline: Baseline, fit: Estimate) -> float:
     """Weigh squares against the number of parameters, for candidates of one round."""
     n = baseline.n_errors
-    parameters = int(fit.plant.free.sum()) + len(fit.local) * fit.plant.n_own
+    parameters = int(fit.plant.free.sum()) + len(fit.local) * (fit.plant.n_local - fit.plant.n_start)
     return 0.5 * n * math.log(fit.squares) + 0.5 * parameters * math.log(n)
 
 

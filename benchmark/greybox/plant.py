@@ -18,9 +18,7 @@ from simgap.greybox.linear_kernels import companion
 from simgap.greybox.terms import PlantScales, Term
 from simgap.records import Kind
 
-# Of poles, per sample.
-FASTEST_TANK = 5.0
-FASTEST = 1e6
+FASTEST_TANK, FASTEST = 5.0, 1e6  # of poles, per sample
 SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
 MAX_TERMS = 5  # that a search may find
 MOST_OF_A_MACHINE = 8
@@ -159,8 +157,7 @@ class Plant:
     @cached_property
     def per_experiment(self) -> tuple[Term, ...]:
         """Terms whose parameters are estimated anew in every experiment, those that move the states first."""
-        found = [term for term in self.terms if term.effect.own]
-        return tuple(sorted(found, key=lambda term: term.effect.port == "output"))
+        return tuple(sorted((t for t in self.terms if t.effect.own), key=lambda t: t.effect.port == "output"))
 
     @property
     def n_start(self) -> int:
@@ -182,12 +179,7 @@ class Plant:
     @property
     def n_local(self) -> int:
         """Numbers estimated in every experiment: the initial state, then those of its own terms."""
-        return self.n_start + self.n_own
-
-    @cached_property
-    def n_own(self) -> int:
-        """Numbers that the terms have in every experiment."""
-        return sum(term.effect.own for term in self.per_experiment)
+        return self.n_start + sum(term.effect.own for term in self.per_experiment)
 
     def own_part_of(self, term: Term) -> slice:
         """Return where the numbers of a per-experiment term stand among those of an experiment."""
@@ -256,9 +248,7 @@ class Plant:
         for i, term in enumerate(self.remembered, start=self.order):
             if term in smaller.remembered:
                 numbers[:, i] = local[:, smaller.order + smaller.remembered.index(term)]
-        for term in self.terms:
-            if term not in smaller.terms:
-                continue
+        for term in (one for one in self.terms if one in smaller.terms):
             if term in self.per_experiment:
                 numbers[:, self.own_part_of(term)] = local[:, smaller.own_part_of(term)]
             else:

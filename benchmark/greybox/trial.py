@@ -77,8 +77,8 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         plant.terms, estimate,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
-        int(plant.free.sum()), len(baseline.train.u) * plant.n_own,
-        len(valid.u) * plant.n_own,
+        int(plant.free.sum()), len(baseline.train.u) * (plant.n_local - plant.n_start),
+        len(valid.u) * (plant.n_local - plant.n_start),
         np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
     )  # fmt: skip
 
