@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twins import PAIRS
+from twins import PAIRS, STREAMS
 
 import simgap
 from simgap.cli import main
@@ -35,6 +35,18 @@ def test_what_the_records_leave_open_is_named_with_the_record_that_decides(answe
     assert answer.decides
     assert str(answer).startswith(f"{answer.dataset}: The records do not tell ")
     assert "The record below would, with a chance of" in " ".join(str(answer).split())
+
+
+def test_a_machine_that_may_run_away_stays_within_the_travel_under_the_record():
+    """A softening spring lets go beyond 2.4 rad; its estimated numbers alone allow a record that ends there."""
+    twins, seed = PAIRS["spring or sine"], 16
+    machine = twins.machines["cubic_stiffness"]
+    span, travel = (-twins.largest, twins.largest), (-twins.travel, twins.travel)
+    answer = simgap.next_record(
+        twins.at_hand(machine, seed), seed=seed, input_range=span, rate=1e9, seconds=twins.seconds, travel=travel
+    )
+    record = machine.record(answer.u[:, 0], 0.0, (seed, STREAMS["new"]))
+    assert np.max(np.abs(record.y)) < twins.travel
 
 
 def test_the_record_keeps_the_limits(answer):
