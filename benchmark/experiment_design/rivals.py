@@ -57,8 +57,8 @@ class Rival:
         _, local = plant.carry(self.estimate.plant, self.estimate.theta, self.estimate.local)
         return np.repeat(local.mean(axis=0, keepdims=True), experiments, axis=0)
 
-    def drawn(self, count: int) -> list[Rival]:
-        """Draw models from what the records leave open of the numbers, from a fixed seed.
+    def likely(self, count: int) -> Float[np.ndarray, "S p"]:
+        """Return theta, and as many draws from what the records leave open of it, from a fixed seed.
 
         Directions of which they tell nothing stay as they are.
         """
@@ -67,11 +67,8 @@ class Rival:
         size, along = np.linalg.eigh(self.information / scale / scale[:, None])
         told = size > NOTHING
         normal = np.random.default_rng(0).standard_normal((count, int(told.sum())))
-        moved = (normal / np.sqrt(size[told])) @ along[:, told].T / scale
-        return [
-            replace(self, estimate=replace(self.estimate, theta=np.clip(theta + by, plant.low, plant.high)))
-            for by in moved
-        ]
+        drawn = theta + (normal / np.sqrt(size[told])) @ along[:, told].T / scale
+        return np.concatenate((theta[None], np.clip(drawn, plant.low, plant.high)))
 
 
 @dataclass(frozen=True, eq=False)

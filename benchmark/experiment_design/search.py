@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from simgap.experiment_design.limits import Limits
 from simgap.experiment_design.rivals import Question
-from simgap.experiment_design.separation import refitted, separations, simulate
+from simgap.experiment_design.separation import refitted, separations, simulate_likely
 from simgap.experiment_design.signals import Shape, grid, slowed
 from simgap.greybox.evidence import CONFOUNDED
 
@@ -140,8 +140,7 @@ def _reach(
     """Find the lowest and the highest that any rival expects of each output, as far as its numbers are known."""
     low, high = np.full((2, len(u), len(limits.travel_low)), np.nan)
     for question in questions:
-        likely = [one for rival in question.rivals for one in (rival, *rival.drawn(DRAWS))]
-        runs = np.stack([simulate(one, u) for one in likely])  # [r, E, T, ny]
+        runs = np.concatenate([simulate_likely(rival, u, DRAWS) for rival in question.rivals])  # [r, E, T, ny]
         runs = np.nan_to_num(runs, nan=np.inf)
         low[:, list(question.outputs)] = runs.min(axis=(0, 2))
         high[:, list(question.outputs)] = runs.max(axis=(0, 2))

@@ -24,6 +24,12 @@ def simulate(rival: Rival, u: Float[np.ndarray, "E T nu"]) -> Float[np.ndarray, 
     return Simulator(rival.plant, u).run(rival.estimate.theta, rival.starts(len(u)))
 
 
+def simulate_likely(rival: Rival, u: Float[np.ndarray, "E T nu"], draws: int) -> Float[np.ndarray, "S E T ny"]:
+    """Simulate a model, and as many draws of its numbers, from its usual initial state."""
+    thetas = rival.likely(draws)
+    return Simulator(rival.plant, u).run_many(thetas, np.repeat(rival.starts(len(u))[None], len(thetas), axis=0))
+
+
 def separations(question: Question, u: Float[np.ndarray, "E T nu"]) -> Float[np.ndarray, "P 2 E"]:
     """Compute how far each record sets each pair apart, if the first is true and if the second is.
 

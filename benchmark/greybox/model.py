@@ -135,39 +135,41 @@ class FittedPlant:
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Simulate rows n_init .. T-1 with what belongs to this experiment alone estimated from all of it."""
         plant, outputs = self.estimate.plant, list(self.outputs)
-        y_hat = self.simulate(experiment.u[None], experiment.y[None, :n_init][:, :, outputs])[0]
+        u, y = experiment.u[None], experiment.y[None][:, :, outputs]
+        start = self.start(u, y[:, :n_init])
+        y_hat = Simulator(self.forecasting, u).run(self.estimate.theta, start)[0, n_init:]
         if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
             return y_hat  # it grew without bound, which nothing of this experiment can mend
         if plant.per_experiment:
-            y_hat = self._with_own(experiment, n_init)
+            y_hat = self._with_own(u, y, start, n_init)
         if self.outliers:
-            error = experiment.y[n_init:, outputs] - y_hat
+            error = y[0, n_init:] - y_hat
             flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
             for j in (outliers.output for outliers in self.outliers):
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat
 
-    def _with_own(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
+    def _with_own(
+        self, u: Float[np.ndarray, "1 T nu"], y: Float[np.ndarray, "1 T ny"], start: np.ndarray, n_init: int
+    ) -> Float[np.ndarray, "N ny"]:
         """Simulate with the numbers of this experiment that suit all of it best (Gauss-Newton), from the same start."""
-        plant, theta, outputs = self.estimate.plant, self.estimate.theta, list(self.outputs)
-        u, y = experiment.u[None], experiment.y[None][:, :, outputs]
-        _, local = plant.carry(self.forecasting, theta, self.start(u, y[:, :n_init]))
-        measured = Records.measured(u, y, plant.dt)
-        later = np.arange(len(experiment))[None] >= n_init
-        problem = Problem(plant, replace(measured, mask=later), white(self.noise.deviations))
+        plant, theta = self.estimate.plant, self.estimate.theta
+        _, local = plant.carry(self.forecasting, theta, start)
+        later = np.arange(y.shape[1])[None] >= n_init
+        problem = Problem(plant, replace(Records.measured(u, y, plant.dt), mask=later), white(self.noise.deviations))
         own, of_none = slice(plant.n_start, plant.n_local), np.zeros(plant.size, dtype=bool)
         errors = problem.errors(theta, local)
         for _ in range(OWN_STEPS):
             slopes = problem.jacobian(theta, local, of_none)
             if not slopes.finite:
                 break
-            target = problem.noise.whiten(errors).ravel()
+            step = np.linalg.lstsq(slopes.local[own, 0].T, problem.noise.whiten(errors).ravel(), rcond=None)[0]
             attempt = local.copy()
-            attempt[0, own] += np.linalg.lstsq(slopes.local[own, 0].T, target, rcond=None)[0]
-            errors_then = problem.errors(theta, attempt)
-            if not np.sum(errors_then**2) < np.sum(errors**2):
+            attempt[0, own] += step
+            left = problem.errors(theta, attempt)
+            if not np.sum(left**2) < np.sum(errors**2):
                 break
-            local, errors = attempt, errors_then
+            local, errors = attempt, left
         return problem.simulator.run(theta, local)[0, n_init:]
 
     def log_likelihood(self) -> float:

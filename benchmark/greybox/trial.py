@@ -68,6 +68,7 @@ class Trial:
 def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     """Score a fitted model on training and on held-out data, under autoregressive noise of the given order."""
     plant, valid = estimate.plant, baseline.valid
+    own = plant.n_local - plant.n_start  # numbers of single experiments
     fixed = np.ones(plant.size, dtype=bool)
     problem = Problem(plant, valid, baseline.noise)
     on_valid = descend(problem, estimate.theta, fixed=fixed, max_steps=10)
@@ -77,8 +78,7 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         plant.terms, estimate,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
-        int(plant.free.sum()), len(baseline.train.u) * (plant.n_local - plant.n_start),
-        len(valid.u) * (plant.n_local - plant.n_start),
+        int(plant.free.sum()), len(baseline.train.u) * own, len(valid.u) * own,
         np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
     )  # fmt: skip
 

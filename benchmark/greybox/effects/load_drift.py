@@ -23,10 +23,10 @@ class LoadDrift(ForceEffect):
     name: ClassVar[str] = "load_drift"
     title: ClassVar[str] = "a drifting load"
     explanation: ClassVar[str] = (
-        "A force, a flow or a heat from outside grows or fades steadily: a leak that opens, the room that cools down, "
+        "A force, a flow or a heat from outside comes and goes slowly: a leak that opens, the room that cools down, "
         "a cable that winds up, a bearing that warms."
     )
-    reference: ClassVar[str] = "Isermann, Fault-Diagnosis Systems, 2006, ch. 5"
+    reference: ClassVar[str] = "Ljung, System Identification, 1999, section 14.1"
     own: ClassVar[int] = 5
     substeps: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
@@ -36,9 +36,9 @@ class LoadDrift(ForceEffect):
             "hold the machine still, or read it with a second sensor: the reading of a drifting sensor still moves, "
             "while a load that drifts has moved the machine itself"
         ),
-        "constant_load": "record for longer: a load that drifts goes on growing, a constant one does not",
+        "constant_load": "record for longer: a load that drifts goes on changing, a constant one does not",
         "gain_fade": "record without any input: a load that drifts is still there, a fading gain has nothing to act on",
-        "periodic_disturbance": "record for longer: a disturbance repeats itself, a load that drifts goes on growing",
+        "periodic_disturbance": "record for longer: a disturbance repeats itself, a load that drifts does not",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
