@@ -80,14 +80,16 @@ class Evidence:
     def _in_order(self) -> list[tuple[Term, float]]:
         """Every effect with the share of the error that it takes on top of those before it.
 
-        What takes most of the held-out error is next: it is what training has not been fitted to.
+        What takes most of the held-out error is next: it is what training has not been fitted to. What has numbers of
+        its own in every experiment is fitted to held-out records too, and comes after all that is forecast.
         """
         selection = self.selection
         left, before, listed = list(selection.trial.terms), selection.baseline.estimate.squares, []
         while left:
             known = [term for term, _ in listed]
-            fits = selection.each_only([[*known, term] for term in left])
-            term, fit = min(zip(left, fits, strict=True), key=lambda pair: float(pair[1].blocks.sum()))
+            next_ones = [term for term in left if not term.effect.own] or left
+            fits = selection.each_only([[*known, term] for term in next_ones])
+            term, fit = min(zip(next_ones, fits, strict=True), key=lambda pair: float(pair[1].blocks.sum()))
             listed.append((term, (before - fit.estimate.squares) / selection.baseline.estimate.squares))
             left.remove(term)
             before = fit.estimate.squares
