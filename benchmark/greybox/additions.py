@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -29,19 +30,19 @@ PROMISING = 8  # effects of a known machine that are fitted at all
 FINALISTS_OF_MACHINE = 5
 MORE_STEPS = 8  # until they are compared again
 
-# The models with one effect more than those of the key, and whether only linear effects were asked for.
-Extended = dict[tuple[frozenset[tuple[str, int]], bool], tuple[Estimate, ...]]
+# What is asked for: linear effects, all whose numbers hold for every experiment, or those with numbers of each one.
+Among = Literal["linear", "forecast", "own"]
+# The models with one effect more than those of the key, by what was asked for.
+Extended = dict[tuple[frozenset[tuple[str, int]], Among], tuple[Estimate, ...]]
 
 
-def with_one_more(
-    baseline: Baseline, estimate: Estimate, extended: Extended, linear_only: bool = False
-) -> tuple[Estimate, ...]:
-    """Fit a model with each candidate added (or each linear one), those to the end that may still be the best.
+def with_one_more(baseline: Baseline, estimate: Estimate, extended: Extended, among: Among) -> tuple[Estimate, ...]:
+    """Fit a model with each candidate added that is asked for, those to the end that may still be the best.
 
     What is in `extended` is not fitted again.
     """
     terms = estimate.plant.terms
-    key = key_of(terms, linear_only)
+    key = key_of(terms, among)
     if key in extended:
         return extended[key]
 
@@ -49,7 +50,7 @@ def with_one_more(
         gained = 0.5 * baseline.n_errors * math.log(estimate.squares / fit.squares)
         return gained >= WORTH_A_REFIT or bool(fit.plant.per_experiment)
 
-    tried = [term for term in candidates(baseline, terms) if term.effect.linear or not linear_only]
+    tried = [term for term in candidates(baseline, terms) if _is_among(term, among)]
     scored, finalists = list(zip(tried, score_tests(baseline, estimate, tried), strict=True)), FINALISTS
     if baseline.plant.machine is not None:  # which needs no other poles for any of them
         scored.sort(key=lambda one: -max((gain for gain, *_ in one[1]), default=0.0))
@@ -60,13 +61,23 @@ def with_one_more(
     return extended[key]
 
 
+def with_any_more(baseline: Baseline, estimate: Estimate, extended: Extended, *asked: Among) -> tuple[Estimate, ...]:
+    """Fit a model with each candidate added, or with those that are asked for."""
+    every = asked or get_args(Among)[1:]
+    return tuple(fit for among in every for fit in with_one_more(baseline, estimate, extended, among))
+
+
 def _begin(baseline: Baseline, estimate: Estimate, tested: tuple[Term, Sequence[Scored]]) -> Estimate | None:
     return extend(baseline, estimate, *tested, max_steps=FEW_STEPS)
 
 
-def key_of(terms: Sequence[Term], linear_only: bool = False) -> tuple[frozenset[tuple[str, int]], bool]:
-    """Return what a set of effects is remembered by."""
-    return frozenset(term.key for term in terms), linear_only
+def _is_among(term: Term, among: Among) -> bool:
+    return term.effect.linear if among == "linear" else bool(term.effect.own) == (among == "own")
+
+
+def key_of(terms: Sequence[Term], among: Among) -> tuple[frozenset[tuple[str, int]], Among]:
+    """Return what the models with one effect more than these are remembered by."""
+    return frozenset(term.key for term in terms), among
 
 
 def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:

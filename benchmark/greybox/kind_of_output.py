@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from simgap.greybox.additions import Extended, extend, with_one_more
+from simgap.greybox.additions import Extended, extend, with_any_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.fitting import Estimate
@@ -172,7 +172,7 @@ class _Hypotheses:
 
 def _extended(plain: Hypothesis) -> Hypothesis:
     extended: Extended = {}
-    larger = with_one_more(plain.baseline, plain.baseline.estimate, extended)
+    larger = with_any_more(plain.baseline, plain.baseline.estimate, extended)
     return replace(plain, larger=larger, extended=extended)
 
 

@@ -75,6 +75,14 @@ def schwarz_order(
     return int(np.argmax([likelihood - order * price for order, likelihood in enumerate(likelihoods)]))
 
 
+def explained_by_past(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> float:
+    """Compute the share of the squares of errors e that the errors before them explain, the mean over the outputs."""
+    total = np.mean(e[mask] ** 2, axis=0)
+    if not (np.isfinite(total) & (total > 0)).all():
+        return 0.0
+    return float(np.mean(1.0 - estimate(e, mask, MAX_ORDER).deviations ** 2 / total))
+
+
 def log_likelihood(
     e: Float[np.ndarray, "E T ny"],
     mask: Bool[np.ndarray, "E T"],

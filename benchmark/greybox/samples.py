@@ -74,6 +74,15 @@ class Records:
             np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt, self.soft
         )
 
+    def halves(self) -> tuple[Records, Records]:
+        """Deal out the experiments, or cut a single one in two."""
+        if len(self.u) > 1:
+            every = np.arange(len(self.u))
+            return self.only(every[::2]), self.only(every[1::2])
+        middle = self.mask.shape[1] // 2
+        u, y, mask = (np.ascontiguousarray(values[:, middle:]) for values in (self.u, self.y, self.mask))
+        return self.beginning(middle), Records(u, y, mask, self.dt, self.soft)
+
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""
         count = self.mask.shape[1] // samples

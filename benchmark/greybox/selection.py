@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.additions import Extended, as_special_case, extend, key_of, with_one_more
+from simgap.greybox.additions import Among, Extended, as_special_case, extend, key_of, with_any_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
@@ -66,34 +66,35 @@ class Selection:
 
     def has_extended(self, trial: Trial) -> bool:
         """Tell whether a model with each candidate added was fitted already."""
-        return key_of(trial.terms) in self.extended
+        return key_of(trial.terms, "forecast") in self.extended
 
     def extend(self, trial: Trial) -> list[Trial]:
         """Fit and assess a model with each candidate added; what the selection has fitted is not fitted again."""
-        fits = with_one_more(self.baseline, trial.estimate, dict(self.extended))
+        fits = with_any_more(self.baseline, trial.estimate, dict(self.extended))
         return assessed(self.baseline, fits, self.noise_order)
 
 
 def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     """Choose effects: what the readings show, what a linear model lacks, then all; superfluous ones are taken out.
 
-    What was `extended` before on this baseline is not fitted again.
+    What has numbers of its own in every experiment takes a little of everything, and comes last. What was `extended`
+    before on this baseline is not fitted again.
     """
     search = _Search(baseline, extended=dict(extended or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
     if baseline.plant.machine is None:
-        trial = search.forward(trial, linear_only=True)
-    trial = search.forward(trial)
-    trial = search.backward(trial)
-    if baseline.plant.machine is None:  # the order of a known machine is no guess that an early choice rests on
-        trial = search.exchange(trial)
+        trial = search.forward(trial, "linear")
+    trial = search.settled(search.forward(trial, "forecast"), "forecast")
+    if baseline.repeated:
+        larger = search.forward(trial, "forecast", "own")
+        trial = search.settled(larger, "forecast", "own") if larger.terms != trial.terms else larger
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
 def select_around(baseline: Baseline, estimate: Estimate) -> Selection:
     """Choose further effects beside those of a fitted model; superfluous ones are taken out."""
     search = _Search(baseline)
-    trial = search.backward(search.forward(assess(baseline, estimate, 0)))
+    trial = search.backward(search.forward(assess(baseline, estimate, 0), "forecast", "own"))
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
@@ -118,11 +119,17 @@ class _Search:
                 trial = larger
         return trial
 
-    def forward(self, trial: Trial, linear_only: bool = False) -> Trial:
-        """Add the best effect, one after the other, while noise alone would not do as well."""
+    def settled(self, trial: Trial, *asked: Among) -> Trial:
+        """Take out what is superfluous, and try what is asked for in the place of what is left."""
+        trial = self.backward(trial)
+        # The order of a known machine is no guess that an early choice rests on.
+        return self.exchange(trial, *asked) if self.baseline.plant.machine is None else trial
+
+    def forward(self, trial: Trial, *asked: Among) -> Trial:
+        """Add the best effect of those asked for, one after the other, while noise alone would not do as well."""
         while len(trial.terms) < self.baseline.plant.most_terms:
-            stage(_looking(trial, linear_only))
-            fits = with_one_more(self.baseline, trial.estimate, self.extended, linear_only)
+            stage(_looking(trial, asked))
+            fits = with_any_more(self.baseline, trial.estimate, self.extended, *asked)
             self.noise_order, trial, trials = judged(self.baseline, trial, fits, self.noise_order)
             self.rounds.append(Round(trial, trials))
             better = ranked([other for other in trials if significant(self.baseline, trial, other)])
@@ -154,8 +161,8 @@ class _Search:
     def _special_cases(self, term: Term) -> list[Term]:
         return [t for t in candidates(self.baseline) if term.replaces(t) and t.channel == term.channel]
 
-    def exchange(self, trial: Trial) -> Trial:
-        """Try every other effect in the place of each, because the first choice was made without the others.
+    def exchange(self, trial: Trial, *asked: Among) -> Trial:
+        """Try every other effect that is asked for in the place of each: the first was chosen without the others.
 
         A choice that errs less on held-out data, though it is less likely in training, is a way to one of two others:
         a curve and a friction are the best in the place of each other where both stand for a dead zone and unequal
@@ -164,23 +171,23 @@ class _Search:
         for term in trial.terms if 1 < len(trial.terms) < self.baseline.plant.most_terms else ():
             if term not in trial.terms or term.effect.visible_in_readings:
                 continue
-            found = self._in_place_of(term, trial)
+            found = self._in_place_of(term, trial, *asked)
             trial = self._better(trial, found)
             on_the_way = next((other for other in found if in_most(trial.blocks - other.blocks)), None)
             if on_the_way:
                 kept = [one for one in trial.terms if one in on_the_way.terms]
-                found = ranked([other for one in kept for other in self._in_place_of(one, on_the_way)])
+                found = ranked([other for one in kept for other in self._in_place_of(one, on_the_way, *asked)])
                 trial = self._better(trial, found)
         return trial
 
     def _better(self, trial: Trial, found: Sequence[Trial]) -> Trial:
         return self.backward(found[0]) if found and found[0].score > trial.score + BETTER else trial
 
-    def _in_place_of(self, term: Term, trial: Trial) -> list[Trial]:
+    def _in_place_of(self, term: Term, trial: Trial, *asked: Among) -> list[Trial]:
         """List the models with another effect in the place of one, the best first."""
         stage(f"Trying others in the place of {term.effect.title}")
         rest = self._without(trial, term)
-        fits = with_one_more(self.baseline, rest.estimate, self.extended)
+        fits = with_any_more(self.baseline, rest.estimate, self.extended, *asked)
         trials = assessed(self.baseline, fits, self.noise_order)
         return ranked([other for other in trials if significant(self.baseline, rest, other)])
 
@@ -195,9 +202,9 @@ def _key(terms: Sequence[Term]) -> frozenset[tuple[str, int]]:
     return frozenset(term.key for term in terms)
 
 
-def _looking(trial: Trial, linear_only: bool) -> str:
+def _looking(trial: Trial, asked: Sequence[Among]) -> str:
     beside = ", ".join(term.effect.title for term in trial.terms)
-    wanted = "delay, lag and constant load" if linear_only else "a cause"
+    wanted = "delay, lag and constant load" if "linear" in asked else "a cause"
     return f"Looking for {wanted} beside {beside}" if beside else f"Looking for {wanted}"
 
 

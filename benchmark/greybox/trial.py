@@ -13,9 +13,9 @@ from scipy.stats import chi2
 from simgap.cores import on_cores
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.held_out import BLOCKS, in_most
-from simgap.greybox.noise import log_likelihood, schwarz_order
+from simgap.greybox.fitting import Estimate
+from simgap.greybox.held_out import in_most, on_other_records, squares_crosswise, squares_of_blocks
+from simgap.greybox.noise import explained_by_past, log_likelihood, schwarz_order
 from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, candidates
 from simgap.greybox.terms import Term
@@ -30,6 +30,12 @@ WORST = 10.0  # times the squares of the mean model: what the error of a held-ou
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
 MATTERS_AT_ALL = 0.003  # of what the plain model has
+# Share of what the errors before them explain of the errors: what an effect beside others must take. Such errors may be
+# the trace of something that is no candidate, and a wrong effect takes a part of them.
+OF_MEMORY = 0.25
+# Of the squared error that each half of the training records leaves in the other: what a cause leaves that held-out
+# records do not confirm, if they do not speak against it either.
+MOST = 0.5
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
 
@@ -45,6 +51,7 @@ class Trial:
     k: int  # parameters estimated for all experiments
     k_train: int  # parameters of single training experiments
     k_valid: int
+    memory: float  # share of the squared training errors that the errors before them explain
     blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
 
     @property
@@ -69,17 +76,15 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     """Score a fitted model on training and on held-out data, under autoregressive noise of the given order."""
     plant, valid = estimate.plant, baseline.valid
     own = plant.n_local - plant.n_start  # numbers of single experiments
-    fixed = np.ones(plant.size, dtype=bool)
     problem = Problem(plant, valid, baseline.noise)
-    on_valid = descend(problem, estimate.theta, fixed=fixed, max_steps=10)
-    squares = np.where(valid.mask[:, :, None], baseline.noise.whiten(on_valid.errors) ** 2 + problem.least, 0.0)
-    blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
+    on_valid = on_other_records(problem, estimate.theta)
     return Trial(
         plant.terms, estimate,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
         int(plant.free.sum()), len(baseline.train.u) * own, len(valid.u) * own,
-        np.concatenate([block.sum(axis=(1, 2)) for block in blocks]),
+        explained_by_past(estimate.errors, baseline.train.mask),
+        squares_of_blocks(problem, on_valid.errors),
     )  # fmt: skip
 
 
@@ -121,9 +126,18 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
     tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
-    gain = smaller.estimate.squares - larger.estimate.squares
-    matters = gain > MATTERS * smaller.estimate.squares and gain > MATTERS_AT_ALL * baseline.estimate.squares
-    return bool(matters and chance < FALSE_NAMES and holds_out(baseline, smaller, larger))
+    return bool(chance < FALSE_NAMES and _matters(baseline, smaller, larger) and holds_out(baseline, smaller, larger))
+
+
+def _matters(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether an effect takes enough of the squared errors to be worth a name.
+
+    Beside other effects it must also take its share of errors with memory: of free runs, or of one-step errors.
+    """
+    before, gain = smaller.estimate.squares, smaller.estimate.squares - larger.estimate.squares
+    enough = gain > MATTERS * before and gain > MATTERS_AT_ALL * baseline.estimate.squares
+    of_one_step = 1.0 - math.exp(-2.0 * max(0.0, larger.train - smaller.train) / baseline.n_errors)
+    return enough and (not smaller.terms or max(gain / before, of_one_step) > OF_MEMORY * larger.memory)
 
 
 def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
@@ -156,7 +170,13 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
-    return bool(of_many) or in_most(gain)
+    if of_many or in_most(gain):
+        return True
+    if baseline.plant.machine is not None or not gain.mean() > 0:
+        return False
+    # A record that stands still for most of its time tells little of what takes most of the error in all others.
+    before, after = (squares_crosswise(baseline, trial.estimate) for trial in (smaller, larger))
+    return bool(after.sum() < MOST * before.sum()) and in_most(before - after)
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:

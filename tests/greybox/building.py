@@ -12,9 +12,10 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
-from simgap.greybox.additions import add, with_one_more
+from simgap.greybox.additions import add, with_any_more
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
+from simgap.greybox.held_out import squares_crosswise
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
@@ -81,7 +82,7 @@ def with_effects(search, *names):
 
 def best_of_round(search):
     """The plain model and the best of all its extensions by one effect."""
-    fits = with_one_more(search, search.estimate, {})
+    fits = with_any_more(search, search.estimate, {})
     return assess(search, search.estimate, 0), assessed(search, fits, 0)[0]
 
 
@@ -133,15 +134,26 @@ def in_order(search, trial):
 # ------------------------------------------------------------------ trials
 
 
-def trial(search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out=None, held_out_gain=0.0, own_there=0):
+def trial(
+    search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out=None, held_out_gain=0.0, own_there=0,
+    effects=(), memory=0.0,
+):  # fmt: skip
     """A trial of hand-made numbers.
 
     `squares` of the plain model's; `own` and `own_there` count numbers of single experiments in training and held-out
-    data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data.
+    data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
+    the share of the errors that the errors before them explain.
     """
     estimate = replace(search.estimate, squares=squares * search.estimate.squares)
     blocks = np.ones(20) if held_out is None else np.asarray(held_out, dtype=float)
-    return Trial((), estimate, float(log_likelihood), float(held_out_gain), parameters, own, own_there, blocks)
+    likelihoods = float(log_likelihood), float(held_out_gain)
+    terms = tuple(term(name) for name in effects)
+    return Trial(terms, estimate, *likelihoods, parameters, own, own_there, memory, blocks)
+
+
+def by_the_other_half(search, trial):
+    """The squares of training errors, block by block, each half forecast by what was fitted to the other."""
+    return squares_crosswise(search, trial.estimate)
 
 
 def score_of_trial(made):

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from .building import (
     best_of_round,
+    by_the_other_half,
     candidates,
     chances,
     cut_in_pieces,
@@ -18,6 +19,7 @@ from .building import (
     score_of_trial,
     significant,
     trial,
+    with_effects,
 )
 from .parts import experiments
 from .plants import free_run, steps, velocity
@@ -28,10 +30,10 @@ LIKELY = 1000.0  # a log-likelihood ratio beyond doubt
 BETTER = np.full(20, 0.5)  # held-out blocks that beat those of a trial, which are 1
 
 
-def searched(load, seed=0):
+def searched(load, seed=0, limit=np.inf):
     rng = np.random.default_rng(seed)
     u = steps(rng, (4, 120), low=-0.6)
-    y = free_run(velocity(), u + load, 0.1)[0] + 0.05 * rng.standard_normal((4, 120, 1))
+    y = free_run(velocity(), np.clip(u + load, -limit, limit), 0.1)[0] + 0.05 * rng.standard_normal((4, 120, 1))
     made = experiments(u, y, 0.1)
     return plain_search(made[:3], made[3:], "velocity")
 
@@ -73,6 +75,17 @@ def test_what_is_nothing_beside_the_plain_models_error_is_not_worth_a_name(searc
         assert significant(search, smaller, larger) is expected
 
 
+@pytest.mark.parametrize("memory", [0.5, 0.9])
+def test_beside_others_an_effect_must_take_a_quarter_of_what_errors_remember(search, memory):
+    first = {"effects": ["coulomb_friction"], "squares": 0.5}
+    for share, expected in ((0.26 * memory, True), (0.24 * memory, False)):
+        made = {"squares": 0.5 * (1 - share), "log_likelihood": 16.0, "memory": memory, "held_out": BETTER}
+        assert significant(search, trial(search, **first), trial(search, **made)) is expected
+        # The first effect of all is not judged by that, nor one without which the next sample is hard to forecast.
+        assert significant(search, trial(search, squares=0.5), trial(search, **made))
+        assert significant(search, trial(search, **first), trial(search, **{**made, "log_likelihood": LIKELY}))
+
+
 def believed(search, gains):
     """Whether a larger model with these gains of its twenty held-out blocks is."""
     smaller = trial(search, held_out=np.full(20, 9.0))
@@ -94,6 +107,17 @@ def test_a_gain_that_comes_and_goes_from_block_to_block_is_believed_in_one_case_
 def test_what_simulates_held_out_data_worse_is_not_believed_however_likely(search):
     larger = trial(search, squares=0.5, log_likelihood=LIKELY, parameters=2, held_out=np.full(20, 1.01))
     assert not significant(search, trial(search), larger)
+
+
+@pytest.mark.parametrize(("last", "expected"), [(0.5, True), (1.8, False)])
+def test_what_held_out_records_leave_open_is_believed_if_training_records_forecast_it_of_each_other(last, expected):
+    search = searched(0.0, limit=0.3)
+    plain, limited = with_effects(search), with_effects(search, "input_saturation")
+    before, after = (by_the_other_half(search, made) for made in (plain, limited))
+    assert after.sum() < 0.5 * before.sum()
+    # A held-out record that stands still three times: better, as it was, and better or worse.
+    blocks = np.r_[np.full(7, 0.4), np.linspace(0.9, 1.1, 7), np.full(6, last)]
+    assert significant(search, replace(plain, blocks=np.ones(20)), replace(limited, blocks=blocks)) is expected
 
 
 def with_errors(made, share):
