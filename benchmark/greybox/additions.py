@@ -32,8 +32,10 @@ MORE_STEPS = 8  # until they are compared again
 
 # What is asked for: linear effects, all whose numbers hold for every experiment, or those with numbers of each one.
 Among = Literal["linear", "forecast", "own"]
-# The models with one effect more than those of the key, by what was asked for.
-Extended = dict[tuple[frozenset[tuple[str, int]], Among], tuple[Estimate, ...]]
+# The models with one effect more than those of the key, by what was asked for, and the squares of the one before them.
+Extended = dict[tuple[frozenset[tuple[str, int]], Among], tuple[float, tuple[Estimate, ...]]]
+# Of the squares that a model had when effects were added to it: where a fit from elsewhere has less, they are anew.
+CLEARLY_LESS = 0.98
 
 
 def with_one_more(baseline: Baseline, estimate: Estimate, extended: Extended, among: Among) -> tuple[Estimate, ...]:
@@ -43,8 +45,9 @@ def with_one_more(baseline: Baseline, estimate: Estimate, extended: Extended, am
     """
     terms = estimate.plant.terms
     key = key_of(terms, among)
-    if key in extended:
-        return extended[key]
+    before, known = extended.get(key, (math.inf, ()))
+    if estimate.squares > CLEARLY_LESS * before:
+        return known
 
     def worth(fit: Estimate) -> bool:
         gained = 0.5 * baseline.n_errors * math.log(estimate.squares / fit.squares)
@@ -57,8 +60,9 @@ def with_one_more(baseline: Baseline, estimate: Estimate, extended: Extended, am
         scored, finalists = scored[:PROMISING], FINALISTS_OF_MACHINE
     begun = [fit for fit in on_cores(partial(_begin, baseline, estimate), scored) if fit is not None]
     begun.sort(key=lambda fit: _cost(baseline, fit))
-    extended[key] = tuple(_anew(baseline, estimate, _race(baseline, begun[:finalists], worth)))
-    return extended[key]
+    fits = tuple(_anew(baseline, estimate, _race(baseline, begun[:finalists], worth)))
+    extended[key] = estimate.squares, fits
+    return fits
 
 
 def with_any_more(baseline: Baseline, estimate: Estimate, extended: Extended, *asked: Among) -> tuple[Estimate, ...]:

@@ -85,9 +85,8 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     if baseline.plant.machine is None:
         trial = search.forward(trial, "linear")
     trial = search.settled(search.forward(trial, "forecast"), "forecast")
-    if baseline.repeated:
-        larger = search.forward(trial, "forecast", "own")
-        trial = search.settled(larger, "forecast", "own") if larger.terms != trial.terms else larger
+    larger = search.forward(trial, "forecast", "own")
+    trial = search.settled(larger, "forecast", "own") if larger.terms != trial.terms else larger
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 

@@ -132,12 +132,15 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
 def _matters(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether an effect takes enough of the squared errors to be worth a name.
 
-    Beside other effects it must also take its share of errors with memory: of free runs, or of one-step errors.
+    Beside other effects it must also take its share of errors with memory: of free runs in training, of held-out ones
+    if nothing is estimated anew there, or of one-step errors.
     """
     before, gain = smaller.estimate.squares, smaller.estimate.squares - larger.estimate.squares
-    enough = gain > MATTERS * before and gain > MATTERS_AT_ALL * baseline.estimate.squares
+    if not (gain > MATTERS * before and gain > MATTERS_AT_ALL * baseline.estimate.squares):
+        return False
+    held_out = 1.0 - larger.blocks.sum() / smaller.blocks.sum() if larger.k_valid == smaller.k_valid else 0.0
     of_one_step = 1.0 - math.exp(-2.0 * max(0.0, larger.train - smaller.train) / baseline.n_errors)
-    return enough and (not smaller.terms or max(gain / before, of_one_step) > OF_MEMORY * larger.memory)
+    return not smaller.terms or bool(max(gain / before, held_out, of_one_step) > OF_MEMORY * larger.memory)
 
 
 def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
