@@ -35,7 +35,7 @@ MATTERS_AT_ALL = 0.003  # of what the plain model has
 OF_MEMORY = 0.25
 # Of the squared error that each half of the training records leaves in the other: what a cause leaves that held-out
 # records do not confirm, if they do not speak against it either.
-MOST = 0.5
+HALVES_LEAVE = 0.5
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
 
@@ -179,7 +179,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         return False
     # A record that stands still for most of its time tells little of what takes most of the error in all others.
     before, after = (squares_crosswise(baseline, trial.estimate) for trial in (smaller, larger))
-    return bool(after.sum() < MOST * before.sum()) and in_most(before - after)
+    return bool(after.sum() < HALVES_LEAVE * before.sum()) and in_most(before - after)
 
 
 def ranked(trials: list[Trial]) -> list[Trial]:

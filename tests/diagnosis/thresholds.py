@@ -31,6 +31,8 @@ THRESHOLDS = (
     ("simgap.greybox.trial", "CONSISTENT"),
     ("simgap.greybox.trial", "MATTERS"),
     ("simgap.greybox.trial", "MATTERS_AT_ALL"),
+    ("simgap.greybox.trial", "OF_MEMORY"),
+    ("simgap.greybox.trial", "HALVES_LEAVE"),
     ("simgap.greybox.trial", "ALIKE"),
     ("simgap.greybox.trial", "WORST"),
     ("simgap.greybox.selection", "BETTER"),
