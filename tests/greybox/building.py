@@ -86,6 +86,12 @@ def best_of_round(search):
     return assess(search, search.estimate, 0), assessed(search, fits, 0)[0]
 
 
+def added_to(search, squares, remembered):
+    """Models with one effect more than the plain one, as if its fit had so many times its squares."""
+    fit = replace(search.estimate, squares=squares * search.estimate.squares)
+    return with_any_more(search, fit, remembered)
+
+
 def names_of(trial):
     """The effects of a trial."""
     return trial.names

@@ -5,7 +5,7 @@ import pytest
 
 from simgap.data.simulated.rigs import hide
 
-from .building import in_order, passing_alone, plain_search, pruned, sizes_of, with_effects, without_each
+from .building import added_to, in_order, passing_alone, plain_search, pruned, sizes_of, with_effects, without_each
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -109,3 +109,10 @@ def test_unequal_gains_are_found_before_a_dead_zone_and_behind_it(late):
     found = sizes_of(with_effects(plain_search(made[:3], made[3:], "velocity"), "asymmetric_gain", "dead_zone"))
     assert found["asymmetric_gain"] == pytest.approx(0.3, rel=0.03)
     assert found["dead_zone"] == pytest.approx(0.2, rel=0.03)
+
+
+def test_effects_are_added_anew_where_a_better_fit_of_the_same_model_is_at_hand(search):
+    remembered = {}
+    first = added_to(search, 1.1, remembered)
+    assert all(a is b for a, b in zip(first, added_to(search, 1.09, remembered), strict=True))
+    assert not any(fit in first for fit in added_to(search, 1.0, remembered))
