@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -32,6 +32,7 @@ MORE_STEPS = 8  # until they are compared again
 
 # What is asked for: linear effects, all whose numbers hold for every experiment, or those with numbers of each one.
 Among = Literal["linear", "forecast", "own"]
+EVERY: tuple[Among, ...] = ("forecast", "own")  # linear ones are among the forecast
 # The models with one effect more than those of the key, by what was asked for, and the squares of the one before them.
 Extended = dict[tuple[frozenset[tuple[str, int]], Among], tuple[float, tuple[Estimate, ...]]]
 # Of the squares that a model had when effects were added to it: where a fit from elsewhere has less, they are anew.
@@ -67,8 +68,7 @@ def with_one_more(baseline: Baseline, estimate: Estimate, extended: Extended, am
 
 def with_any_more(baseline: Baseline, estimate: Estimate, extended: Extended, *asked: Among) -> tuple[Estimate, ...]:
     """Fit a model with each candidate added, or with those that are asked for."""
-    every = asked or get_args(Among)[1:]
-    return tuple(fit for among in every for fit in with_one_more(baseline, estimate, extended, among))
+    return tuple(fit for among in asked or EVERY for fit in with_one_more(baseline, estimate, extended, among))
 
 
 def _begin(baseline: Baseline, estimate: Estimate, tested: tuple[Term, Sequence[Scored]]) -> Estimate | None:

@@ -70,18 +70,19 @@ class Records:
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""
-        return Records(
-            np.ascontiguousarray(self.u[:, :samples]), self.y[:, :samples], self.mask[:, :samples], self.dt, self.soft
-        )
+        return self._between(0, samples)
 
     def halves(self) -> tuple[Records, Records]:
         """Deal out the experiments, or cut a single one in two."""
         if len(self.u) > 1:
             every = np.arange(len(self.u))
             return self.only(every[::2]), self.only(every[1::2])
-        middle = self.mask.shape[1] // 2
-        u, y, mask = (np.ascontiguousarray(values[:, middle:]) for values in (self.u, self.y, self.mask))
-        return self.beginning(middle), Records(u, y, mask, self.dt, self.soft)
+        samples = self.mask.shape[1]
+        return self._between(0, samples // 2), self._between(samples // 2, samples)
+
+    def _between(self, first: int, last: int) -> Records:
+        u, y, mask = (values[:, first:last] for values in (self.u, self.y, self.mask))
+        return Records(np.ascontiguousarray(u), y, mask, self.dt, self.soft)
 
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""

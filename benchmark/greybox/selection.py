@@ -85,15 +85,15 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     if baseline.plant.machine is None:
         trial = search.forward(trial, "linear")
     trial = search.settled(search.forward(trial, "forecast"), "forecast")
-    larger = search.forward(trial, "forecast", "own")
-    trial = search.settled(larger, "forecast", "own") if larger.terms != trial.terms else larger
+    larger = search.forward(trial)
+    trial = search.settled(larger) if larger.terms != trial.terms else larger
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
 def select_around(baseline: Baseline, estimate: Estimate) -> Selection:
     """Choose further effects beside those of a fitted model; superfluous ones are taken out."""
     search = _Search(baseline)
-    trial = search.backward(search.forward(assess(baseline, estimate, 0), "forecast", "own"))
+    trial = search.backward(search.forward(assess(baseline, estimate, 0)))
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
@@ -125,7 +125,7 @@ class _Search:
         return self.exchange(trial, *asked) if self.baseline.plant.machine is None else trial
 
     def forward(self, trial: Trial, *asked: Among) -> Trial:
-        """Add the best effect of those asked for, one after the other, while noise alone would not do as well."""
+        """Add the best effect, or of those asked for, one after the other, while noise alone would not do as well."""
         while len(trial.terms) < self.baseline.plant.most_terms:
             stage(_looking(trial, asked))
             fits = with_any_more(self.baseline, trial.estimate, self.extended, *asked)
