@@ -108,7 +108,8 @@ def damped_step(h, gradient, cross, blocks, block_gradient, inside, damping, ste
         matrix[i, i] += damping + 10 * TINY
         right[i, 0] = gradient_left[free[i]] / scale[i]
     solve_in_place(matrix, right)
-    step[:] = 0.0
+    for i in range(p):
+        step[i] = 0.0
     promised = 0.0
     for i in range(len(free)):
         step[free[i]] = right[i, 0] / scale[i]

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import cache, wraps
+from typing import Any
 
 import numpy as np
 from numba import NumbaExperimentalFeatureWarning, njit, types
+from numba.extending import intrinsic
 
 # Function pointers as arguments are called experimental since 2020; what is used of them is tested.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
@@ -13,11 +17,13 @@ warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 # Every force term: (x, v, t, h, p, i, m, j) -> number, see simgap.greybox.effects.effect.ForceEffect.
 TERM = types.float64(
     types.float64, types.float64, types.float64, types.float64,
-    types.float64[::1], types.int64, types.float64[::1], types.int64,
+    types.CPointer(types.float64), types.int64, types.CPointer(types.float64), types.int64,
 )  # fmt: skip
 SLOTS = 5  # force terms that one model may have; the tuple has this length, so that the loop is compiled once
 # In the order of simgap.greybox.effects.effect.Role.
 FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
+
+MOST_STATES = 4  # of a body
 
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
@@ -25,6 +31,40 @@ _loop = types.void(
     types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, types.float64[::1],
     types.float64[:, :, :, ::1],
 )  # fmt: skip
+
+
+def directly(signature: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Compile a loop when it is first called, and call it without numba's dispatch.
+
+    The dispatch would work out the types of the terms anew at every call, which takes longer than most simulations.
+    Whoever calls the loop keeps to the signature.
+    """
+
+    def decorate(loop: Callable[..., None]) -> Callable[..., None]:
+        kernel = njit(cache=True, nogil=True)(loop)
+
+        @cache
+        def compiled() -> Callable[..., None]:
+            kernel.compile(signature)
+            return kernel.overloads[kernel.signatures[0]].entry_point
+
+        @wraps(loop)
+        def run(*arguments: Any) -> None:
+            compiled()(*arguments)
+
+        return run
+
+    return decorate
+
+
+@intrinsic
+def pointer(context, array):
+    """Return where the numbers of an array begin; a pointer costs a call of a term a third of what an array does."""
+
+    def data(context, builder, signature, arguments):
+        return context.make_array(signature.args[0])(context, builder, arguments[0]).data
+
+    return types.CPointer(types.float64)(array), data
 
 
 @njit(types.float64(types.float64, types.float64, types.float64, types.float64), cache=True, nogil=True)
@@ -40,8 +80,8 @@ def dry_friction(v, new, gain, hold):
     return min(max(-new / gain, -hold), hold)
 
 
-@njit(_loop, cache=True, nogil=True)
-def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
+@directly(_loop)
+def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
     es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
@@ -49,73 +89,94 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
     The drive [S, E, T * substeps] is constant over each substep. Linear parts are exact; forces are extrapolated
     linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound
     that brings the velocity nearest to zero (Moreau 1988), so that it sticks without events. The terms come sorted by
-    their role; until[role] counts those of this role and of the ones before.
+    their role; until[role] counts those of this role and of the ones before. A body has up to four states; what a
+    smaller one lacks stays zero, and the loop has no inner ones over the states.
     """
     _, experiments, samples, n = states.shape
-    fast = min(1, n - 1)
-    z, new, g0, g1, e = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
+    e, g0, g1, z = (
+        np.zeros((MOST_STATES, MOST_STATES)),
+        np.zeros(MOST_STATES),
+        np.zeros(MOST_STATES),
+        np.zeros(MOST_STATES),
+    )
+    held = pointer(memory)
     for s in range(len(states)):
-        p = thetas[s]
+        theta = pointer(thetas[s])
         for i in range(n):
             g0[i], g1[i] = g0s[s, i, entry], g1s[s, i, entry]
             for j in range(n):
                 e[i, j] = es[s, i, j]
-        gain = g0[fast] + 1e-300
+        a0, a1, a2, a3 = g0[0], g0[1], g0[2], g0[3]
+        b0, b1, b2, b3 = g1[0], g1[1], g1[2], g1[3]
+        e00, e01, e02, e03 = e[0, 0], e[0, 1], e[0, 2], e[0, 3]
+        e10, e11, e12, e13 = e[1, 0], e[1, 1], e[1, 2], e[1, 3]
+        e20, e21, e22, e23 = e[2, 0], e[2, 1], e[2, 2], e[2, 3]
+        e30, e31, e32, e33 = e[3, 0], e[3, 1], e[3, 2], e[3, 3]
+        gain = (a1 if n > 1 else a0) + 1e-300
         spring = rates[s, 0] if n > 1 else 0.0
         for experiment in range(experiments):
             u, motion = drive[s, experiment], states[s, experiment]
             for i in range(n):
                 z[i] = start[s, experiment, i]
+            z0, z1, z2, z3 = z[0], z[1], z[2], z[3]
             for i in range(len(memory)):
                 memory[i] = 0.0
             before, step = 0.0, 0
             for k in range(samples):
-                for i in range(n):
-                    motion[k, i] = z[i]
+                motion[k, 0] = z0
+                if n > 1:
+                    motion[k, 1] = z1
+                if n > 2:
+                    motion[k, 2] = z2
+                if n > 3:
+                    motion[k, 3] = z3
                 if k == samples - 1:
                     break
                 for _ in range(substeps):
+                    v = z1 if n > 1 else z0
                     force = 0.0
                     for q in range(until[FORCE]):
-                        force += terms[q](z[0], z[fast], step * h, h, p, p_at[q], memory, m_at[q])
+                        force += terms[q](z0, v, step * h, h, theta, p_at[q], held, m_at[q])
                     hold = 0.0
                     for q in range(until[FORCE], until[FRICTION]):
                         if m_at[q] < m_at[q + 1]:
                             # What the transmission carries: the drive against spring and forces.
-                            memory[m_at[q]] = abs(u[step] + spring * z[0] - force)
-                        hold += terms[q](z[0], z[fast], step * h, h, p, p_at[q], memory, m_at[q])
+                            memory[m_at[q]] = abs(u[step] + spring * z0 - force)
+                        hold += terms[q](z0, v, step * h, h, theta, p_at[q], held, m_at[q])
                     change = force - before if step > 0 else 0.0
-                    for i in range(n):
-                        total = g0[i] * u[step]
-                        for j in range(n):
-                            total += e[i, j] * z[j]
-                        new[i] = total + (g0[i] * force + g1[i] * change)
+                    by = u[step]
+                    new0 = a0 * by + e00 * z0 + e01 * z1 + e02 * z2 + e03 * z3 + (a0 * force + b0 * change)
+                    new1 = a1 * by + e10 * z0 + e11 * z1 + e12 * z2 + e13 * z3 + (a1 * force + b1 * change)
+                    new2 = a2 * by + e20 * z0 + e21 * z1 + e22 * z2 + e23 * z3 + (a2 * force + b2 * change)
+                    new3 = a3 * by + e30 * z0 + e31 * z1 + e32 * z2 + e33 * z3 + (a3 * force + b3 * change)
                     if hold > 0.0:
-                        impulse = dry_friction(z[fast], new[fast], gain, hold)
-                        for i in range(n):
-                            new[i] += g0[i] * impulse
+                        impulse = dry_friction(v, new1 if n > 1 else new0, gain, hold)
+                        new0 += a0 * impulse
+                        new1 += a1 * impulse
+                        new2 += a2 * impulse
+                        new3 += a3 * impulse
                     for q in range(until[RIM], until[STOP]):
-                        end = min(max(new[0], p[p_at[q]]), p[p_at[q] + 1])
-                        if new[0] != end:
+                        end = min(max(new0, theta[p_at[q]]), theta[p_at[q] + 1])
+                        if new0 != end:
                             # The impact takes the velocity towards the stop and leaves one that is away from it.
-                            new[fast] = min(new[fast], 0.0) if new[0] > end else max(new[fast], 0.0)
-                            new[0] = end
-                    for i in range(n):
-                        z[i] = new[i]
+                            new1 = min(new1, 0.0) if new0 > end else max(new1, 0.0)
+                            new0 = end
+                    z0, z1, z2, z3 = new0, new1, new2, new3
                     before = force
                     step += 1
 
 
-@njit(_loop, cache=True, nogil=True)
+@directly(_loop)
 def run_tanks(  # noqa: PLR0912 - as above
     es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a cascade of tanks, as run_body does; forces act on the first one as inflows."""
     _, experiments, samples, n = states.shape
     z, new, flow, before = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    held = pointer(memory)
     for run in range(len(states) * experiments):
         s, experiment = run // experiments, run % experiments
-        e, g0, g1, p = es[s], g0s[s], g1s[s], thetas[s]
+        e, g0, g1, p, theta = es[s], g0s[s], g1s[s], thetas[s], pointer(thetas[s])
         u, levels, last = drive[s, experiment], states[s, experiment], rates[s, n - 1]
         for i in range(n):
             z[i] = start[s, experiment, i]
@@ -132,12 +193,12 @@ def run_tanks(  # noqa: PLR0912 - as above
                 for i in range(n):
                     flow[i] = 0.0
                 for q in range(until[FORCE]):
-                    flow[entry] += terms[q](z[0], z[0], step * h, h, p, p_at[q], memory, m_at[q])
+                    flow[entry] += terms[q](z[0], z[0], step * h, h, theta, p_at[q], held, m_at[q])
                 for q in range(until[FRICTION], until[OUTFLOW]):
                     for i in range(n):
                         # In units of the last tank's level, so that one law serves tanks of any size.
                         level = z[i] * rates[s, i] / (last + 1e-300)
-                        out = last * terms[q](level, 0.0, step * h, h, p, p_at[q], memory, m_at[q])
+                        out = last * terms[q](level, 0.0, step * h, h, theta, p_at[q], held, m_at[q])
                         flow[i] -= out
                         if i + 1 < n:
                             flow[i + 1] += out
@@ -163,18 +224,27 @@ def run_tanks(  # noqa: PLR0912 - as above
                 step += 1
 
 
-@njit(
+@directly(
     types.void(
-        _matrix, _matrix, types.float64, types.UniTuple(types.FunctionType(TERM), SLOTS), _places, types.float64[::1],
-        _places, _places, _matrix, types.float64[::1], _cube,
-    ),
-    cache=True, nogil=True,
-)  # fmt: skip
+        _matrix,
+        _matrix,
+        types.float64,
+        types.UniTuple(types.FunctionType(TERM), SLOTS),
+        _places,
+        types.float64[::1],
+        _places,
+        _places,
+        _matrix,
+        types.float64[::1],
+        _cube,
+    )
+)
 def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, memory, states):
     """Fill states [E, T, 2] with the force that an imposed motion [E, T] takes, and with the rate of the drive [E, T].
 
     Between two samples the motion is even. Where it stands still, dry friction goes on holding as it did before.
     """
+    p, held = pointer(theta), pointer(memory)
     for experiment in range(len(drive)):
         for i in range(len(memory)):
             memory[i] = begun[experiment, i]
@@ -188,17 +258,10 @@ def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, mem
                 side = 1.0 if v > 0.0 else -1.0
             force = drive[experiment, k]
             for q in range(until[FORCE]):
-                force -= terms[q](x, v, k * dt, h, theta, p_at[q], memory, m_at[q])
+                force -= terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
             for q in range(until[FORCE], until[FRICTION]):
                 if m_at[q] < m_at[q + 1]:
                     memory[m_at[q]] = abs(force)
-                force += side * terms[q](x, v, k * dt, h, theta, p_at[q], memory, m_at[q])
+                force += side * terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
             states[experiment, k, 0] = force
             states[experiment, k, 1] = rate
-
-
-# The compiled functions themselves: numba would work out the types of the terms anew at every call, which takes longer
-# than most simulations. Whoever calls them keeps to the one signature.
-run_body_directly, run_tanks_directly, follow_motion_directly = (
-    f.overloads[f.signatures[0]].entry_point for f in (run_body, run_tanks, follow_motion)
-)

@@ -76,12 +76,13 @@ def companion(sections, a):
             product[i] = polynomial[i]
             for q in range(min(width, i)):
                 product[i] += polynomial[i - 1 - q] * sections[first + q]
-        polynomial[:] = product
-    a[:, :] = 0.0
+        for i in range(n + 1):
+            polynomial[i] = product[i]
     for i in range(n):
-        if i + 1 < n:
-            a[i, i + 1] = 1.0
-        a[n - 1, i] = -polynomial[n - i]
+        for j in range(n):
+            a[i, j] = 1.0 if j == i + 1 else 0.0
+    for j in range(n):
+        a[n - 1, j] = -polynomial[n - j]
 
 
 @njit(types.void(_cube, _cube, types.int64, _cube, _cube, types.int64, _states), cache=True, nogil=True)
@@ -122,7 +123,9 @@ def read(known, states, which, readings, y):
     for s in range(len(y)):
         of_run = states[which[s]] if which[s] >= 0 else known[0]
         for j in range(outputs):
-            y[s, :, :, j] = 0.0
+            for experiment in range(experiments):
+                for k in range(samples):
+                    y[s, experiment, k, j] = 0.0
             for i in range(of_run.shape[2]):
                 c = readings[s, j, i]
                 if c != 0.0:  # what no sensor sees may grow without bound

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 
-from numba import njit, types
+from numba import types
 
-from simgap.greybox.kernels import FORCE, FRICTION, OUTFLOW, RIM, SLOTS, STOP, TERM, dry_friction
+from simgap.greybox.kernels import FORCE, FRICTION, OUTFLOW, RIM, SLOTS, STOP, TERM, directly, dry_friction, pointer
 
 _row, _matrix, _cube = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
 _places, _terms = types.int64[::1], types.UniTuple(types.FunctionType(TERM), SLOTS)
 
 
-@njit(
+@directly(
     types.void(
         types.boolean, _matrix, _matrix, _matrix, _matrix, _row, _row, _row, _matrix, types.int64, types.float64,
         _terms, _places, _row, _places, _places, _row, _terms, _places, types.int64, _cube,
-    ),
-    cache=True, nogil=True,
+    )
 )  # fmt: skip
 def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
     loop, goal, gain, supply, enabled, inertias, weights, numbers, start, substeps, h,
@@ -32,6 +31,7 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
     """
     damping, back_emf, derivative, stiffness, radian, rest = numbers
     experiments, samples, n = states.shape
+    p, held = pointer(theta), pointer(memory)
     for experiment in range(experiments):
         inertia, weight = inertias[experiment] * radian, weights[experiment]
         q = start[experiment, 0] if n > 1 else 0.0
@@ -58,20 +58,20 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                 if loop:
                     command = gain[experiment, k] * error - derivative * v
                 for c in range(n_commands):
-                    command = commands[c](command, error, t, h, theta, c_at[c], memory, 0)
+                    command = commands[c](command, error, t, h, p, c_at[c], held, 0)
                 drive = supply[experiment, k] * on * command
                 other = -stiffness * x if n > 1 else 0.0
                 if weight != 0.0:
                     other -= weight * math.sin(radian * (x - rest))
                 for j in range(until[FORCE]):
-                    other += terms[j](x, v, t, h, theta, p_at[j], memory, m_at[j])
+                    other += terms[j](x, v, t, h, p, p_at[j], held, m_at[j])
                 hold = 0.0
                 for j in range(until[FORCE], until[FRICTION]):
                     if m_at[j] < m_at[j + 1]:
                         memory[m_at[j]] = abs(drive - back_emf * on * v - other)
-                    hold += terms[j](x, v, t, h, theta, p_at[j], memory, m_at[j])
+                    hold += terms[j](x, v, t, h, p, p_at[j], held, m_at[j])
                 for j in range(until[FRICTION], until[OUTFLOW]):
-                    other -= terms[j](x, 0.0, t, h, theta, p_at[j], memory, m_at[j])
+                    other -= terms[j](x, 0.0, t, h, p, p_at[j], held, m_at[j])
                 new = v + scale * (drive + other - d * v)
                 if hold > 0.0:
                     new += scale * dry_friction(v, new, scale, hold)
@@ -84,6 +84,3 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                             q = end
                 v = new
                 step += 1
-
-
-run_machine_directly = run_machine.overloads[run_machine.signatures[0]].entry_point

@@ -11,16 +11,10 @@ from jaxtyping import Float
 from numba import cfunc, types
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
-from simgap.greybox.kernels import (
-    SLOTS,
-    TERM,
-    follow_motion_directly,
-    run_body_directly,
-    run_tanks_directly,
-)
+from simgap.greybox.kernels import MOST_STATES, SLOTS, TERM, follow_motion, run_body, run_tanks
 from simgap.greybox.linear_kernels import read, run_linear, transition
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
-from simgap.greybox.machine_kernels import run_machine_directly
+from simgap.greybox.machine_kernels import run_machine
 from simgap.greybox.plant import Plant
 from simgap.greybox.two_masses import ENTRY
 
@@ -129,10 +123,11 @@ class Simulator:
         states = np.empty((s, experiments, samples, n))
         entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
         starts = np.ascontiguousarray(starts)
-        if not self._until[-1]:
+        forces = bool(self._until[-1])
+        if not forces and not 0 < n <= MOST_STATES:
             run_linear(e, g0, entry, drives, starts, self.substeps, states)
             return states
-        run = run_tanks_directly if plant.cascade else run_body_directly
+        run = run_tanks if plant.cascade and forces else run_body
         run(
             e, g0, g1, rates, entry, drives, starts, self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
@@ -159,7 +154,7 @@ class Simulator:
             goal = goal * known.goal_factor
         inertias, weights = machine.moments(self._u_first, theta)
         numbers = np.array([*theta[[DAMPING, BACK_EMF, DERIVATIVE, STIFFNESS]], known.radian, known.hangs_at])
-        run_machine_directly(
+        run_machine(
             machine.controlled, np.ascontiguousarray(goal), gain, supply * theta[plant.layout.gains.start], on,
             inertias, weights, numbers, np.ascontiguousarray(start[:, : plant.order]), self.substeps, self.h,
             self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, self._memory,
@@ -173,7 +168,7 @@ class Simulator:
         n = self.plant.n_start
         begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
         drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
-        follow_motion_directly(
+        follow_motion(
             drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
             self._memory, states,
         )  # fmt: skip
