@@ -23,8 +23,6 @@ SLOTS = 5  # force terms that one model may have; the tuple has this length, so 
 # In the order of simgap.greybox.effects.effect.Role.
 FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
 
-MOST_STATES = 4  # of a body
-
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
     _cube, _cube, _cube, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
@@ -81,7 +79,7 @@ def dry_friction(v, new, gain, hold):
 
 
 @directly(_loop)
-def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
+def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
     es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
@@ -90,80 +88,77 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
     linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound
     that brings the velocity nearest to zero (Moreau 1988), so that it sticks without events. The terms come sorted by
     their role; until[role] counts those of this role and of the ones before. A body has up to four states; what a
-    smaller one lacks stays zero, and the loop has no inner ones over the states.
+    smaller one lacks stays zero. All runs take a substep before the next one begins: each has to wait for its own last
+    substep, and the processor works on the others meanwhile.
     """
-    _, experiments, samples, n = states.shape
-    e, g0, g1, z = (
-        np.zeros((MOST_STATES, MOST_STATES)),
-        np.zeros(MOST_STATES),
-        np.zeros(MOST_STATES),
-        np.zeros(MOST_STATES),
-    )
-    held = pointer(memory)
-    for s in range(len(states)):
-        theta = pointer(thetas[s])
+    runs, experiments, samples, n = states.shape
+    e, g0, g1 = np.zeros((runs, 4, 4)), np.zeros((runs, 4)), np.zeros((runs, 4))
+    z, held, before = np.zeros((runs, 4)), np.zeros((runs, len(memory))), np.zeros(runs)
+    for s in range(runs):
         for i in range(n):
-            g0[i], g1[i] = g0s[s, i, entry], g1s[s, i, entry]
+            g0[s, i], g1[s, i] = g0s[s, i, entry], g1s[s, i, entry]
             for j in range(n):
-                e[i, j] = es[s, i, j]
-        a0, a1, a2, a3 = g0[0], g0[1], g0[2], g0[3]
-        b0, b1, b2, b3 = g1[0], g1[1], g1[2], g1[3]
-        e00, e01, e02, e03 = e[0, 0], e[0, 1], e[0, 2], e[0, 3]
-        e10, e11, e12, e13 = e[1, 0], e[1, 1], e[1, 2], e[1, 3]
-        e20, e21, e22, e23 = e[2, 0], e[2, 1], e[2, 2], e[2, 3]
-        e30, e31, e32, e33 = e[3, 0], e[3, 1], e[3, 2], e[3, 3]
-        gain = (a1 if n > 1 else a0) + 1e-300
-        spring = rates[s, 0] if n > 1 else 0.0
-        for experiment in range(experiments):
-            u, motion = drive[s, experiment], states[s, experiment]
+                e[s, i, j] = es[s, i, j]
+    for experiment in range(experiments):
+        for s in range(runs):
             for i in range(n):
-                z[i] = start[s, experiment, i]
-            z0, z1, z2, z3 = z[0], z[1], z[2], z[3]
+                z[s, i] = start[s, experiment, i]
             for i in range(len(memory)):
-                memory[i] = 0.0
-            before, step = 0.0, 0
-            for k in range(samples):
-                motion[k, 0] = z0
-                if n > 1:
-                    motion[k, 1] = z1
-                if n > 2:
-                    motion[k, 2] = z2
-                if n > 3:
-                    motion[k, 3] = z3
-                if k == samples - 1:
-                    break
-                for _ in range(substeps):
+                held[s, i] = 0.0
+            before[s] = 0.0
+        step = 0
+        for k in range(samples):
+            for s in range(runs):
+                for i in range(n):
+                    states[s, experiment, k, i] = z[s, i]
+            if k == samples - 1:
+                break
+            for _ in range(substeps):
+                for s in range(runs):
+                    z0, z1, z2, z3 = z[s, 0], z[s, 1], z[s, 2], z[s, 3]
                     v = z1 if n > 1 else z0
+                    u, p, m = drive[s, experiment, step], pointer(thetas[s]), pointer(held[s])
                     force = 0.0
                     for q in range(until[FORCE]):
-                        force += terms[q](z0, v, step * h, h, theta, p_at[q], held, m_at[q])
+                        force += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
                     hold = 0.0
                     for q in range(until[FORCE], until[FRICTION]):
                         if m_at[q] < m_at[q + 1]:
                             # What the transmission carries: the drive against spring and forces.
-                            memory[m_at[q]] = abs(u[step] + spring * z0 - force)
-                        hold += terms[q](z0, v, step * h, h, theta, p_at[q], held, m_at[q])
-                    change = force - before if step > 0 else 0.0
-                    by = u[step]
-                    new0 = a0 * by + e00 * z0 + e01 * z1 + e02 * z2 + e03 * z3 + (a0 * force + b0 * change)
-                    new1 = a1 * by + e10 * z0 + e11 * z1 + e12 * z2 + e13 * z3 + (a1 * force + b1 * change)
-                    new2 = a2 * by + e20 * z0 + e21 * z1 + e22 * z2 + e23 * z3 + (a2 * force + b2 * change)
-                    new3 = a3 * by + e30 * z0 + e31 * z1 + e32 * z2 + e33 * z3 + (a3 * force + b3 * change)
+                            spring = rates[s, 0] if n > 1 else 0.0
+                            held[s, m_at[q]] = abs(u + spring * z0 - force)
+                        hold += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
+                    change = force - before[s] if step > 0 else 0.0
+                    a, a0, a1, a2, a3 = e[s], g0[s, 0], g0[s, 1], g0[s, 2], g0[s, 3]
+                    b0, b1, b2, b3 = g1[s, 0], g1[s, 1], g1[s, 2], g1[s, 3]
+                    new0 = (
+                        a0 * u + a[0, 0] * z0 + a[0, 1] * z1 + a[0, 2] * z2 + a[0, 3] * z3 + (a0 * force + b0 * change)
+                    )
+                    new1 = (
+                        a1 * u + a[1, 0] * z0 + a[1, 1] * z1 + a[1, 2] * z2 + a[1, 3] * z3 + (a1 * force + b1 * change)
+                    )
+                    new2 = (
+                        a2 * u + a[2, 0] * z0 + a[2, 1] * z1 + a[2, 2] * z2 + a[2, 3] * z3 + (a2 * force + b2 * change)
+                    )
+                    new3 = (
+                        a3 * u + a[3, 0] * z0 + a[3, 1] * z1 + a[3, 2] * z2 + a[3, 3] * z3 + (a3 * force + b3 * change)
+                    )
                     if hold > 0.0:
+                        gain = (a1 if n > 1 else a0) + 1e-300
                         impulse = dry_friction(v, new1 if n > 1 else new0, gain, hold)
                         new0 += a0 * impulse
                         new1 += a1 * impulse
                         new2 += a2 * impulse
                         new3 += a3 * impulse
                     for q in range(until[RIM], until[STOP]):
-                        end = min(max(new0, theta[p_at[q]]), theta[p_at[q] + 1])
+                        end = min(max(new0, p[p_at[q]]), p[p_at[q] + 1])
                         if new0 != end:
                             # The impact takes the velocity towards the stop and leaves one that is away from it.
                             new1 = min(new1, 0.0) if new0 > end else max(new1, 0.0)
                             new0 = end
-                    z0, z1, z2, z3 = new0, new1, new2, new3
-                    before = force
-                    step += 1
+                    z[s, 0], z[s, 1], z[s, 2], z[s, 3] = new0, new1, new2, new3
+                    before[s] = force
+                step += 1
 
 
 @directly(_loop)

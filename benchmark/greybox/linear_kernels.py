@@ -88,32 +88,30 @@ def companion(sections, a):
 @njit(types.void(_cube, _cube, types.int64, _cube, _cube, types.int64, _states), cache=True, nogil=True)
 def run_linear(es, g0s, entry, drive, start, substeps, states):
     """Fill states [S, E, T, n] of S linear plants without forces, as `kernels.run_body` does with them."""
-    _, experiments, samples, n = states.shape
-    z, new, g0, e = np.empty(n), np.empty(n), np.empty(n), np.empty((n, n))
-    for s in range(len(states)):
-        for i in range(n):
-            g0[i] = g0s[s, i, entry]
-            for j in range(n):
-                e[i, j] = es[s, i, j]
-        for experiment in range(experiments):
-            u, motion = drive[s, experiment], states[s, experiment]
+    runs, experiments, samples, n = states.shape
+    z, new = np.empty((runs, n)), np.empty(n)
+    for experiment in range(experiments):
+        for s in range(runs):
             for i in range(n):
-                z[i] = start[s, experiment, i]
-            step = 0
-            for k in range(samples):
+                z[s, i] = start[s, experiment, i]
+        step = 0
+        for k in range(samples):
+            for s in range(runs):
                 for i in range(n):
-                    motion[k, i] = z[i]
-                if k == samples - 1:
-                    break
-                for _ in range(substeps):
+                    states[s, experiment, k, i] = z[s, i]
+            if k == samples - 1:
+                break
+            for _ in range(substeps):
+                for s in range(runs):
+                    u, e, g0 = drive[s, experiment, step], es[s], g0s[s]
                     for i in range(n):
-                        total = g0[i] * u[step]
+                        total = g0[i, entry] * u
                         for j in range(n):
-                            total += e[i, j] * z[j]
+                            total += e[i, j] * z[s, j]
                         new[i] = total
                     for i in range(n):
-                        z[i] = new[i]
-                    step += 1
+                        z[s, i] = new[i]
+                step += 1
 
 
 @njit(types.void(_states, _states, _places, _cube, _states), cache=True, nogil=True)

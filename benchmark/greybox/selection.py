@@ -77,16 +77,16 @@ class Selection:
 def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     """Choose effects: what the readings show, what a linear model lacks, then all; superfluous ones are taken out.
 
-    What has numbers of its own in every experiment takes a little of everything, and comes last. What was `extended`
-    before on this baseline is not fitted again.
+    What has numbers of its own in every experiment takes a little of everything, and comes last: where the effects
+    that are left beside it are better than those without it, all may join them. What was `extended` before on this
+    baseline is not fitted again.
     """
     search = _Search(baseline, extended=dict(extended or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
     if baseline.plant.machine is None:
         trial = search.forward(trial, "linear")
     trial = search.settled(search.forward(trial, "forecast"), "forecast")
-    larger = search.forward(trial)
-    trial = search.settled(larger) if larger.terms != trial.terms else larger
+    trial = search.with_own(trial)
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
@@ -123,6 +123,15 @@ class _Search:
         trial = self.backward(trial)
         # The order of a known machine is no guess that an early choice rests on.
         return self.exchange(trial, *asked) if self.baseline.plant.machine is None else trial
+
+    def with_own(self, trial: Trial) -> Trial:
+        """Add what has numbers of its own in every experiment; where that is better, all effects may join it."""
+        # Beside nothing, all have been fitted already, and are what such an effect must be told from.
+        larger = self.backward(self.forward(trial, "own") if trial.terms else self.forward(trial))
+        alone = self._assess(trial.estimate)  # under the same noise
+        if larger.terms == trial.terms or larger.score < alone.score + BETTER:
+            return alone
+        return self.settled(self.forward(larger))
 
     def forward(self, trial: Trial, *asked: Among) -> Trial:
         """Add the best effect, or of those asked for, one after the other, while noise alone would not do as well."""

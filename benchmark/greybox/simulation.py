@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numba import cfunc, types
 
 from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
-from simgap.greybox.kernels import MOST_STATES, SLOTS, TERM, follow_motion, run_body, run_tanks
+from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body, run_tanks
 from simgap.greybox.linear_kernels import read, run_linear, transition
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine
@@ -123,11 +123,10 @@ class Simulator:
         states = np.empty((s, experiments, samples, n))
         entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
         starts = np.ascontiguousarray(starts)
-        forces = bool(self._until[-1])
-        if not forces and not 0 < n <= MOST_STATES:
+        if not self._until[-1]:
             run_linear(e, g0, entry, drives, starts, self.substeps, states)
             return states
-        run = run_tanks if plant.cascade and forces else run_body
+        run = run_tanks if plant.cascade else run_body
         run(
             e, g0, g1, rates, entry, drives, starts, self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
