@@ -107,7 +107,7 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
     shapes = plant.machine.shapes(starts[0]) if plant.machine else list(
         denominator_grid(plant, records, coarse=True)
     ) if few else [
-        [a * scale for a in starts[0][plant.layout.poles]] for scale in (0.25, 0.5, 1.0, 2.0)
+        [a * scale for a in starts[0][plant.layout.poles]] for scale in ((1.0,) if plant.joint else (0.25, 0.5, 1.0, 2.0))
     ]  # fmt: skip
     for shape in shapes:
         for start in starts:
