@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.stats import wilcoxon
 
-from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import initial_states, usual_start
 from simgap.greybox.noise import white
@@ -18,7 +16,6 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.samples import RESOLUTION, Records
 
 BLOCKS = 20
-FEW_STEPS = 10  # from the fit to all records to that of a half
 # Chance of a gain in held-out blocks where there is none; for normal gains, 1.3 standard errors of their mean.
 BY_CHANCE = 0.1
 
@@ -60,17 +57,6 @@ def squares_of_blocks(problem: Problem, errors: np.ndarray) -> np.ndarray:
     squares = np.where(measured, problem.noise.whiten(errors) ** 2 + problem.least, 0.0)
     blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
     return np.concatenate([block.sum(axis=(1, 2)) for block in blocks])
-
-
-@lru_cache(maxsize=100)
-def squares_crosswise(baseline: Baseline, estimate: Estimate) -> np.ndarray:
-    """Sum the squares, block by block, of each half of the training records by the model fitted to the other half."""
-    halves = [Problem(estimate.plant, half, baseline.noise) for half in baseline.train.halves()]
-    found = []
-    for ours, others in (halves, halves[::-1]):
-        fit = descend(ours, estimate.theta, max_steps=FEW_STEPS, tolerance=TOLERANCE)
-        found.append(squares_of_blocks(others, on_other_records(others, fit.theta).errors))
-    return np.concatenate(found)
 
 
 def as_good_as_best(errors: Sequence[np.ndarray]) -> int:

@@ -14,7 +14,7 @@ from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import CONSISTENT, score_gain
+from simgap.greybox.trial import CONSISTENT, halves_speak_for, score_gain
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -40,10 +40,11 @@ class LinearRival:
 def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> LinearRival | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
-    What is nonlinear must score higher than that, and err no more in most held-out blocks. A lag or a delay is a linear
-    model itself, of few parameters, and is believed as long as more of them hardly help. None too where effects are of
-    single experiments and cannot be forecast. The orders of an output that is no motion and no level have been tried
-    already; see `_of_tried_order`.
+    What is nonlinear must score higher than that, and err no more in most held-out blocks; or leave less than half of
+    what the linear model leaves of records that neither was fitted to: no order has such a stand-in. A lag or a delay
+    is a linear model itself, of few parameters, and is believed as long as more of them hardly help. None too where
+    effects are of single experiments and cannot be forecast. The orders of an output that is no motion and no level
+    have been tried already; see `_of_tried_order`.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
     output, *others = plain.outputs
@@ -64,7 +65,9 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         better = better and gain.mean() > BEYOND * (without.mean() - with_effects.mean())
         return LinearRival.of(linear, gain) if better else None
     beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    return None if beaten else LinearRival.of(linear, gain)
+    if beaten or halves_speak_for(plain, chosen, linear.estimate):
+        return None
+    return LinearRival.of(linear, gain)
 
 
 def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:
@@ -86,6 +89,8 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
         if not alike:
             return None
         gain, best = max(alike, key=_mean_gain)
+    if halves_speak_for(plain, chosen, best):
+        return None
     return LinearRival.of(replace(plain, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
 
 

@@ -103,12 +103,13 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
     gains = np.zeros(plant.size, dtype=bool)
     gains[plant.layout.gains] = gains[plant.layout.offset] = True
     begun = []
-    few = plant.order <= 2
-    shapes = plant.machine.shapes(starts[0]) if plant.machine else list(
-        denominator_grid(plant, records, coarse=True)
-    ) if few else [
-        [a * scale for a in starts[0][plant.layout.poles]] for scale in ((1.0,) if plant.joint else (0.25, 0.5, 1.0, 2.0))
-    ]  # fmt: skip
+    poles = starts[0][plant.layout.poles]
+    if plant.machine:
+        shapes = plant.machine.shapes(starts[0])
+    elif plant.order <= 2:
+        shapes = list(denominator_grid(plant, records, coarse=True))
+    else:  # those of a joint were found with its effects beside them
+        shapes = [list(scale * poles) for scale in ((1.0,) if plant.joint else (0.25, 0.5, 1.0, 2.0))]
     for shape in shapes:
         for start in starts:
             theta = start.copy()

@@ -15,7 +15,6 @@ from simgap.greybox import samples as _samples
 from simgap.greybox.additions import add, with_any_more
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.held_out import squares_crosswise
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
@@ -23,7 +22,7 @@ from simgap.greybox.samples import Records
 from simgap.greybox.score_test import candidates as _candidates
 from simgap.greybox.score_test import score_tests
 from simgap.greybox.selection import Selection, _Search, passes
-from simgap.greybox.trial import Trial, assess, assessed
+from simgap.greybox.trial import Trial, assess, assessed, squares_crosswise
 from simgap.greybox.trial import ranked as _ranked
 from simgap.greybox.trial import significant as _significant
 

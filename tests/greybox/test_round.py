@@ -42,7 +42,7 @@ def test_models_pass_through_a_round_with_at_most_six_changes_of_module_and_two_
     training = hide("cart", {"coulomb_friction": 1.0}, seed=1).training
     baseline = find_baseline(training.train, training.valid, training.channels, (0,), training.n_init)
     trial, search = assess(baseline, baseline.estimate, 0), _Search(baseline)
-    entered = _modules_entered(lambda: search.forward(trial))
+    entered = _modules_entered(lambda: search.forward(trial, "forecast"))
     ends = [i + 1 for i, module in enumerate(entered) if module == "trial"]
     assert len(ends) == len(search.rounds) == 2
     for first, end in zip([0, *ends], ends, strict=False):
