@@ -176,7 +176,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
     if of_many or in_most(gain):
         return True
-    undecided = baseline.plant.machine is None and gain.mean() > 0
+    undecided = baseline.plant.machine is None and bool(gain.mean() > 0)
     return undecided and halves_speak_for(baseline, larger.estimate, smaller.estimate)
 
 
