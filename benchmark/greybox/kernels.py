@@ -101,8 +101,8 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                 e[s, i, j] = es[s, i, j]
     for experiment in range(experiments):
         for s in range(runs):
-            for i in range(n):
-                z[s, i] = start[s, experiment, i]
+            for i in range(4):
+                z[s, i] = start[s, experiment, i] if i < n else 0.0
             for i in range(len(memory)):
                 held[s, i] = 0.0
             before[s] = 0.0
