@@ -98,7 +98,7 @@ class MachineWriter(PlantWriter):
             lines.append(f"    other -= weight * math.sin({turned}{_times(known.radian)})")
         lines += [f"    other += {call}" for _, call in self.forces("force", x, "v", h)]
         lines.append("    hold = 0.0")
-        lines += self.frictions(x, "v", h, f"abs(drive - {p}[{BACK_EMF}] * on * v - other)")
+        lines += self.frictions(x, "v", h, f"drive - {p}[{BACK_EMF}] * on * v - other")
         lines += [f"    other -= {call}" for _, call in self.forces("outflow", x, "0.0", h)]
         lines += [
             f"    d = {p}[{DAMPING}] + {p}[{BACK_EMF}] * on", 

@@ -12,7 +12,7 @@ from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
-from simgap.greybox.simulation import Simulator
+from simgap.greybox.simulation import Simulator, carried
 from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
@@ -75,7 +75,7 @@ class PlantWriter:
             transition(plant.matrix(self.theta), self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
             given[f"RATES{q}"] = -np.diag(plant.matrix(self.theta))
-            given[f"SPRING{q}"] = -plant.matrix(self.theta)[ENTRY if plant.joint else n - 1, :1]
+            given[f"CARRIED{q}"] = carried(plant, plant.matrix(self.theta))
         return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:
@@ -120,12 +120,12 @@ class PlantWriter:
         ]
         return list(zip(found, calls, strict=True))
 
-    def frictions(self, x: str, v: str, h: str, load: str) -> list[str]:
-        """Write what dry friction can hold, after telling it the load that it carries."""
+    def frictions(self, x: str, v: str, h: str, load: str, damping: str = "0.0") -> list[str]:
+        """Write what dry friction can hold, after telling it what the drive carries and what damping takes of it."""
         lines = []
         for term, call in self.forces("friction", x, v, h):
             if term.effect.memory:
-                lines.append(f"    s[{self.memory[term]}] = {load}")
+                lines += [f"    s[{self.memory[term]}] = {load}", f"    s[{self.memory[term] + 1}] = {damping}"]
             lines.append(f"    hold += {call}")
         return lines
 
@@ -134,12 +134,13 @@ class PlantWriter:
         n, fast = plant.order, min(1, plant.order - 1)
         entry = ENTRY if plant.joint else n - 1
         x, v, h = f"s[{at}]", f"s[{at + fast}]", repr(self.h)
-        spring = f"SPRING{q}[0]" if n > 1 else "0.0"
+        pulled = " + ".join(f"CARRIED{q}[{i}] * s[{at + i}]" for i in range(min(n, 4)))
         lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
                  '    """Advance the body by a substep, after so many."""',
                  f"    new = [0.0] * {n}", f"    t = begun * {h}", "    force = 0.0"]  # fmt: skip
         lines += [f"    force += {call}" for _, call in self.forces("force", x, v, h)]
-        lines += ["    hold = 0.0", *self.frictions(x, v, h, f"abs(drive + {spring} * {x} - force)")]
+        load, damping = f"drive + ({pulled}) - force", f"CARRIED{q}[4] * {v}"
+        lines += ["    hold = 0.0", *self.frictions(x, v, h, load, damping)]
         lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
         lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, {fast}, drive, force, change, hold)")
         for term, _ in self.forces("stop", x, v, h):
@@ -227,6 +228,6 @@ class PlantWriter:
                  f"    if s[{v}] != 0.0:", f"        s[{side}] = 1.0 if s[{v}] > 0.0 else -1.0"]  # fmt: skip
         lines += [f"    {line}" for line in self._drive(0, "0")] + ["    force = drive"]
         lines += [f"    force -= {call}" for _, call in self.forces("force", f"s[{newest}]", f"s[{v}]", "h")]
-        for line in self.frictions(f"s[{newest}]", f"s[{v}]", "h", "abs(force)"):
+        for line in self.frictions(f"s[{newest}]", f"s[{v}]", "h", "force"):
             lines.append(line.replace("    hold += ", f"    force += s[{side}] * "))
         return "\n".join([*lines, f"    y[{output}] = force", *self._sensors(), f"    s[{self.count}] = k + 1"])

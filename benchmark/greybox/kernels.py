@@ -124,9 +124,10 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                     hold = 0.0
                     for q in range(until[FORCE], until[FRICTION]):
                         if m_at[q] < m_at[q + 1]:
-                            # What the transmission carries: the drive against spring and forces.
-                            spring = rates[s, 0] if n > 1 else 0.0
-                            held[s, m_at[q]] = abs(u + spring * z0 - force)
+                            # What the transmission carries, and what damping takes of it.
+                            c = rates[s]
+                            held[s, m_at[q]] = u + (c[0] * z0 + c[1] * z1 + c[2] * z2 + c[3] * z3) - force
+                            held[s, m_at[q] + 1] = c[4] * v
                         hold += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
                     change = force - before[s] if step > 0 else 0.0
                     a, a0, a1, a2, a3 = e[s], g0[s, 0], g0[s, 1], g0[s, 2], g0[s, 3]
@@ -256,7 +257,7 @@ def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, mem
                 force -= terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
             for q in range(until[FORCE], until[FRICTION]):
                 if m_at[q] < m_at[q + 1]:
-                    memory[m_at[q]] = abs(force)
+                    memory[m_at[q]] = force
                 force += side * terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
             states[experiment, k, 0] = force
             states[experiment, k, 1] = rate

@@ -68,7 +68,7 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                 hold = 0.0
                 for j in range(until[FORCE], until[FRICTION]):
                     if m_at[j] < m_at[j + 1]:
-                        memory[m_at[j]] = abs(drive - back_emf * on * v - other)
+                        memory[m_at[j]] = drive - back_emf * on * v - other
                     hold += terms[j](x, v, t, h, p, p_at[j], held, m_at[j])
                 for j in range(until[FRICTION], until[OUTFLOW]):
                     other -= terms[j](x, 0.0, t, h, p, p_at[j], held, m_at[j])

@@ -19,6 +19,7 @@ from simgap.greybox.plant import Plant
 from simgap.greybox.two_masses import ENTRY
 
 ROLES = get_args(Role)  # as the kernels number them
+CARRIED = 5  # numbers: see `carried`
 
 
 class Law(types.WrapperAddressProtocol):
@@ -43,6 +44,20 @@ compiled = cache(Law)
 def nothing(x, v, t, h, p, i, m, j):
     """Fill a slot that is not used."""
     return 0.0
+
+
+def carried(plant: Plant, a: Float[np.ndarray, "n n"]) -> Float[np.ndarray, " 5"]:
+    """Return (c, d): the transmission carries drive + c z - forces, and damping takes d v of it.
+
+    c z is what spring and load pull at the side where the forces act.
+    """
+    c, fast = np.zeros(CARRIED), min(1, plant.order - 1)
+    if plant.order:
+        row = -a[ENTRY if plant.joint else -1, : CARRIED - 1]
+        c[: len(row)] = row
+        c[-1] = row[fast] + (row[-1] if plant.joint else 0.0)
+        c[fast] -= c[-1]
+    return c
 
 
 def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
@@ -106,7 +121,7 @@ class Simulator:
             return np.stack([self._machine(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
         e, g0, g1 = np.empty((3, s, n, n))
-        rates = np.empty((s, n))
+        rates = np.empty((s, n if plant.cascade else CARRIED))
         starts, begun = starts[:, :, :n], starts[:, :, n:]
         drives = np.empty((s, *self._u.shape[1:]))
         # Most steps of a Jacobian leave the poles as they are, or what drives the plant.
@@ -119,7 +134,7 @@ class Simulator:
                 continue
             a = plant.matrix(thetas[i])
             transition(a, self.h, e[i], g0[i], g1[i])
-            rates[i] = -np.diag(a) if plant.cascade else -a[ENTRY if plant.joint else -1]
+            rates[i] = -np.diag(a) if plant.cascade else carried(plant, a)
         states = np.empty((s, experiments, samples, n))
         entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
         starts = np.ascontiguousarray(starts)

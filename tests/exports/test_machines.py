@@ -93,7 +93,7 @@ def differs(saved, x):
         (effect("torque_foldback", COMMAND, [0.3, 0.6]), effect("input_saturation", COMMAND, [1.5])),
         (effect("rate_limit", GOAL, [3.0, 2.0]), effect("actuator_lag", GOAL, [0.03]),
          effect("input_delay", GOAL, [0.027])),
-        (effect("load_friction", 0, [0.05, 0.2]), effect("stribeck_friction", 0, [0.05, 0.1, 0.2])),
+        (effect("load_friction", 0, [0.05, 0.2, 0.0]), effect("stribeck_friction", 0, [0.05, 0.1, 0.2])),
         (effect("hard_stop", 0, [-0.3, 0.4]), effect("hysteresis"), effect("sensor_lag")),
     ],
 )  # fmt: skip

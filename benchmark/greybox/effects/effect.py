@@ -125,7 +125,8 @@ class Effect(ABC):
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {}
     # The same cause as a law with more numbers, of the same name, tried where this one was found.
     refined: ClassVar[type[Effect] | None] = None
-    # The states that the term carries through a simulation; the first of a friction is the load that the drive carries.
+    # The states that the term carries through a simulation; the first two of a friction are what the drive carries and
+    # what damping takes of it.
     memory: ClassVar[int] = 0
     # What the simulation does with the value of a force term.
     role: ClassVar[Role] = "force"

@@ -13,7 +13,10 @@ from simgap.registry import EFFECTS
 @EFFECTS.register("load_friction")
 @final
 class LoadFriction(ForceEffect):
-    """f = -(Fc + k |drive - load|) sign(v), the load being what spring, gravity and other forces put on the drive."""
+    """f = -(Fc + k |drive - e d v - load|) sign(v): the load is what spring, gravity and other forces put on the drive.
+
+    e d v is what the motor loses to its back-EMF before its teeth carry anything: a share e of the damping d.
+    """
 
     name: ClassVar[str] = "load_friction"
     title: ClassVar[str] = "friction that grows with the load"
@@ -26,7 +29,7 @@ class LoadFriction(ForceEffect):
         "2025 (arXiv 2410.08650), eq. of model M3"
     )
     role: ClassVar[Role] = "friction"
-    memory: ClassVar[int] = 1
+    memory: ClassVar[int] = 2
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"coulomb_friction": (0,)}
     shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
     confounders: ClassVar[dict[str, str]] = {
@@ -43,15 +46,23 @@ class LoadFriction(ForceEffect):
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the constant friction force, and the share of the load that adds to it."""
+        """Return the constant friction force, the share of the load that adds to it, and that of back-EMF in damping.
+
+        Where a motion is imposed nothing is lost to damping, and the back-EMF of a known machine is told.
+        """
+        back_emf = "share of back-EMF in the damping"
+        known = scales.order == 0 or bool(scales.force)
         return (
             Parameter("friction force", scales.force_unit, 0.0, 10 * scales.force_rms),
             Parameter("share of the load", "", 0.0, 0.95),
+            Parameter.absent(back_emf) if known else Parameter(back_emf, "", 0.0, 1.0),
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from shares of the load with and without a constant part."""
-        return [Start((level * scales.force_rms, share)) for level in (0.0, 0.1) for share in (0.1, 0.3, 0.6)]
+        *_, back_emf = self.parameters(scales)
+        levels = (0.0, 0.1 * scales.force_rms)
+        return [Start((level, share, 0.5 * back_emf.high)) for level in levels for share in (0.1, 0.3, 0.6)]
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is that of a motion."""
@@ -59,5 +70,5 @@ class LoadFriction(ForceEffect):
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
-        """Return the force that dry friction can hold; m[j] is the load."""
-        return p[i] + p[i + 1] * m[j]
+        """Return the force that dry friction can hold; m[j] is the load, m[j + 1] what damping takes."""
+        return p[i] + p[i + 1] * abs(m[j] - p[i + 2] * m[j + 1])
