@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from parameters_of_effects import scales
 from scipy.linalg import expm
 
 from simgap.data.simulated import field, rigs
@@ -9,6 +10,19 @@ from simgap.greybox import two_masses
 from simgap.greybox.identification import identify
 from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator
+from simgap.greybox.terms import PlantScales
+
+from .parts import term
+
+
+def with_load_friction(kind, order, joint, linear, friction):
+    """A plant with friction that grows with the load, and its parameters."""
+    seen = scales(kind, order)
+    load = term("load_friction")
+    plant = Plant(kind, order, 1, 0.05, joint=joint, scales=PlantScales((seen,), (seen,))).having([load])
+    theta = np.zeros(plant.size)
+    theta[: plant.n_linear], theta[plant.part_of(load)] = linear, friction
+    return plant, theta
 
 
 def identified(data):
@@ -32,6 +46,24 @@ def test_a_joint_swings_as_two_masses_on_a_spring(side):
         expected.append(z[{"motor": 0, "load": 2}[side]])
         z = whole[:4, :4] @ z + whole[:4, 4] * value
     assert y == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("drive", "moves"), [(1.9, False), (2.1, True)])
+def test_friction_on_a_joint_grows_with_what_the_joint_pulls_and_not_with_where_it_stands(drive, moves):
+    # At rest, both masses in one place far away, the teeth carry the drive alone: it moves beyond 1 + 0.5 drive.
+    plant, theta = with_load_friction("position", 4, "motor", [1.0, 0.0, 90.0, 60.0, 0.002, 1.0], [1.0, 0.5, 0.0])
+    start = np.array([[100.0, 0.0, 100.0, 0.0]])
+    y = Simulator(plant, np.full((1, 100, 1), drive)).run(theta, start)[0, :, 0]
+    assert (y[-1] > 100.01) == moves
+
+
+@pytest.mark.parametrize("back_emf", [0.0, 1.0])
+def test_back_emf_takes_its_share_of_the_drive_before_the_teeth_carry_it(back_emf):
+    # At an even speed v the teeth carry u - e d v, so that u = d v + k (u - e d v).
+    d, k, u = 2.0, 0.3, 5.0
+    plant, theta = with_load_friction("velocity", 1, "", [d, 1.0], [0.0, k, back_emf])
+    y = Simulator(plant, np.full((1, 400, 1), u)).run(theta, np.zeros((1, 1)))[0, :, 0]
+    assert y[-1] == pytest.approx(u * (1 - k) / (d * (1 - k * back_emf)), rel=1e-3)
 
 
 def test_a_joint_turns_into_a_rigid_drive_where_its_spring_is_hard():
