@@ -79,7 +79,7 @@ def dry_friction(v, new, gain, hold):
 
 
 @directly(_loop)
-def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
+def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
     es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
@@ -87,13 +87,14 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
     The drive [S, E, T * substeps] is constant over each substep. Linear parts are exact; forces are extrapolated
     linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound
     that brings the velocity nearest to zero (Moreau 1988), so that it sticks without events. The terms come sorted by
-    their role; until[role] counts those of this role and of the ones before. A body has up to four states; what a
-    smaller one lacks stays zero. All runs take a substep before the next one begins: each has to wait for its own last
-    substep, and the processor works on the others meanwhile.
+    their role; until[role] counts those of this role and of the ones before. Four states stand in registers; what a
+    smaller body lacks of them stays zero, what a larger one has beyond is in `far`. All runs take a substep before the
+    next one begins: each has to wait for its own last substep, and the processor works on the others meanwhile.
     """
     runs, experiments, samples, n = states.shape
-    e, g0, g1 = np.zeros((runs, 4, 4)), np.zeros((runs, 4)), np.zeros((runs, 4))
-    z, held, before = np.zeros((runs, 4)), np.zeros((runs, len(memory))), np.zeros(runs)
+    size = max(n, 4)
+    e, g0, g1, far = np.zeros((runs, size, size)), np.zeros((runs, size)), np.zeros((runs, size)), np.zeros(size)
+    z, held, before = np.zeros((runs, size)), np.zeros((runs, len(memory))), np.zeros(runs)
     for s in range(runs):
         for i in range(n):
             g0[s, i], g1[s, i] = g0s[s, i, entry], g1s[s, i, entry]
@@ -101,7 +102,7 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                 e[s, i, j] = es[s, i, j]
     for experiment in range(experiments):
         for s in range(runs):
-            for i in range(4):
+            for i in range(size):
                 z[s, i] = start[s, experiment, i] if i < n else 0.0
             for i in range(len(memory)):
                 held[s, i] = 0.0
@@ -129,21 +130,21 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                             held[s, m_at[q]] = u + (c[0] * z0 + c[1] * z1 + c[2] * z2 + c[3] * z3) - force
                             held[s, m_at[q] + 1] = c[4] * v
                         hold += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
-                    change = force - before[s] if step > 0 else 0.0
+                    rise = force - before[s] if step > 0 else 0.0
                     a, a0, a1, a2, a3 = e[s], g0[s, 0], g0[s, 1], g0[s, 2], g0[s, 3]
                     b0, b1, b2, b3 = g1[s, 0], g1[s, 1], g1[s, 2], g1[s, 3]
-                    new0 = (
-                        a0 * u + a[0, 0] * z0 + a[0, 1] * z1 + a[0, 2] * z2 + a[0, 3] * z3 + (a0 * force + b0 * change)
-                    )
-                    new1 = (
-                        a1 * u + a[1, 0] * z0 + a[1, 1] * z1 + a[1, 2] * z2 + a[1, 3] * z3 + (a1 * force + b1 * change)
-                    )
-                    new2 = (
-                        a2 * u + a[2, 0] * z0 + a[2, 1] * z1 + a[2, 2] * z2 + a[2, 3] * z3 + (a2 * force + b2 * change)
-                    )
-                    new3 = (
-                        a3 * u + a[3, 0] * z0 + a[3, 1] * z1 + a[3, 2] * z2 + a[3, 3] * z3 + (a3 * force + b3 * change)
-                    )
+                    new0 = a0 * u + a[0, 0] * z0 + a[0, 1] * z1 + a[0, 2] * z2 + a[0, 3] * z3 + (a0 * force + b0 * rise)
+                    new1 = a1 * u + a[1, 0] * z0 + a[1, 1] * z1 + a[1, 2] * z2 + a[1, 3] * z3 + (a1 * force + b1 * rise)
+                    new2 = a2 * u + a[2, 0] * z0 + a[2, 1] * z1 + a[2, 2] * z2 + a[2, 3] * z3 + (a2 * force + b2 * rise)
+                    new3 = a3 * u + a[3, 0] * z0 + a[3, 1] * z1 + a[3, 2] * z2 + a[3, 3] * z3 + (a3 * force + b3 * rise)
+                    for i in range(4, n):
+                        new0 += a[0, i] * z[s, i]
+                        new1 += a[1, i] * z[s, i]
+                        new2 += a[2, i] * z[s, i]
+                        new3 += a[3, i] * z[s, i]
+                        far[i] = g0[s, i] * u + (g0[s, i] * force + g1[s, i] * rise)
+                        for j in range(n):
+                            far[i] += a[i, j] * z[s, j]
                     if hold > 0.0:
                         gain = (a1 if n > 1 else a0) + 1e-300
                         impulse = dry_friction(v, new1 if n > 1 else new0, gain, hold)
@@ -151,6 +152,8 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                         new1 += a1 * impulse
                         new2 += a2 * impulse
                         new3 += a3 * impulse
+                        for i in range(4, n):
+                            far[i] += g0[s, i] * impulse
                     for q in range(until[RIM], until[STOP]):
                         end = min(max(new0, p[p_at[q]]), p[p_at[q] + 1])
                         if new0 != end:
@@ -158,6 +161,8 @@ def run_body(  # noqa: PLR0912 - one loop, so that it stays in registers
                             new1 = min(new1, 0.0) if new0 > end else max(new1, 0.0)
                             new0 = end
                     z[s, 0], z[s, 1], z[s, 2], z[s, 3] = new0, new1, new2, new3
+                    for i in range(4, n):
+                        z[s, i] = far[i]
                     before[s] = force
                 step += 1
 
