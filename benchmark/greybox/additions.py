@@ -191,12 +191,8 @@ def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term
         theta, local = plant.carry(plain.plant, plain.theta, plain.local)
         theta[plant.n_linear :] = thetas[0][plant.n_linear :]
         return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
-    if (
-        not term.effect.errors_grow
-        or plant.joint
-        or plant.per_experiment
-        or fit.squares < STOOD_IN * baseline.estimate.squares
-    ):
+    far_off = fit.squares >= STOOD_IN * baseline.estimate.squares
+    if not (term.effect.errors_grow and far_off) or plant.joint or plant.per_experiment:
         return fit
     # Multiple shooting (Bock, Recent advances in parameter identification techniques for ODE, 1983).
     of_pieces = refit_from_poles(baseline.in_pieces(plant), thetas, MAX_STEPS, TOLERANCE)

@@ -89,7 +89,8 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
     that brings the velocity nearest to zero (Moreau 1988), so that it sticks without events. The terms come sorted by
     their role; until[role] counts those of this role and of the ones before. Four states stand in registers; what a
     smaller body lacks of them stays zero, what a larger one has beyond is in `far`. All runs take a substep before the
-    next one begins: each has to wait for its own last substep, and the processor works on the others meanwhile.
+    next one begins: each has to wait for its own last substep, and the processor works on the others meanwhile. The
+    rates [S, 5] say what the transmission carries, see `simulation.carried`.
     """
     runs, experiments, samples, n = states.shape
     size = max(n, 4)
