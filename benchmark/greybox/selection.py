@@ -86,6 +86,9 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     if baseline.plant.machine is None:
         trial = search.forward(trial, "linear")
     trial = search.settled(search.forward(trial, "forecast"), "forecast")
+    # Where an exchange found a better fit, others may join that one; what is known beside this fit is not fitted again.
+    larger = search.forward(trial, "forecast")
+    trial = search.settled(larger, "forecast") if larger.terms != trial.terms else larger
     trial = search.with_own(trial)
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
