@@ -2,7 +2,7 @@
 
 A comment above a block says what the block is: `<!-- file NAME -->` is the content of a file, `<!-- not run -->` is for
 make, which would run these tests again. Other blocks of sh and python are run as they stand, those under
-`<!-- slow -->` by make test-slow.
+`<!-- slow -->` by make test-slow, those under `<!-- measured -->` where measured data are at hand.
 """
 
 import os
@@ -113,6 +113,14 @@ def test_the_way_from_a_log_to_a_better_simulator_ends_with_the_numbers_that_it_
     joint = ET.parse(folder / "arm_mjcf" / "model.xml").find(".//joint")
     assert float(joint.get("frictionloss")) == pytest.approx(0.05 * 3.0, rel=0.02)
     assert float(joint.get("damping")) == pytest.approx(0.05 * 3.0, rel=0.02)
+
+
+def test_the_way_from_measured_records_ends_with_the_numbers_that_it_shows(folder, measured):
+    said = "".join(run(folder, "bash", "-euo", "pipefail", "-c", script) for script in to_run("sh", "measured"))
+    (shown,) = (block.text for block in BLOCKS if block.language == "text" and "square-root share" in block.text)
+    assert not [line for line in shown.splitlines() if line != "..." and line not in said]
+    assert "0.605 V" in said
+    assert "differs by 0 " in said
 
 
 def test_its_model_in_baselines_is_registered_by_that_one_file(folder):
