@@ -98,9 +98,9 @@ def with_kinds(dataset: Dataset, kind: str | Mapping[str, str] | None) -> Datase
 
 
 def told(channels: Channels) -> tuple[str, ...]:
-    """Say in words which kinds were read off headings."""
+    """Say in words which kinds were read off names and units."""
     read = [channel for channel in channels.outputs if channel.kind_from == "header"]
     return tuple(
-        f"{channel.name} as {channel.kind} ({f'{channel.unit}, ' if channel.unit else ''}from the header)"
+        f"{channel.name} as {channel.kind} ({f'{channel.unit}, by name and unit' if channel.unit else 'by name'})"
         for channel in read
     )

@@ -94,7 +94,7 @@ def read(
     choices = Choices(inputs, outputs, dt, name, resample, split_gaps)
     described = _known(source, choices, simulated)
     if described is not None:
-        dataset, said = described, None
+        dataset, said = described, ()
     else:
         choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
         table = read_table(source, choices)
@@ -104,7 +104,7 @@ def read(
     if simulated:
         dataset, theirs = split_off(dataset, simulated)
     dataset = with_known(with_kinds(dataset, kind), known)
-    return Reading(dataset, () if said is None else (*told(dataset.channels), *said), theirs)
+    return Reading(dataset, (*told(dataset.channels), *said), theirs)
 
 
 def read_recordings(

@@ -11,6 +11,7 @@ from reprlib import repr as short
 from typing import Any, get_args
 
 from simgap.data.formats.plant_table import read_plant
+from simgap.data.kinds import kind_of
 from simgap.records import LARGEST_VALUE, Channel, Channels, Kind, UnusableInput
 
 FILE = "dataset.toml"
@@ -115,8 +116,11 @@ def _channels(entries: Any, key: str, file: Path) -> tuple[Channel, ...]:
         if "kind_from" in entry and (kind_from not in NOT_WRITTEN or "kind" not in entry):
             known = " or ".join(NOT_WRITTEN)
             raise UnusableInput(f"{file}: {key} has the kind_from {short(kind_from)}; {known} can stand beside a kind")
+        name = _text(entry["name"], f"name of {key}", file)
         unit = _text(entry.get("unit", ""), f"unit of {key}", file, may_be_empty=True)
-        channels.append(Channel(_text(entry["name"], f"name of {key}", file), unit, kind or "other", kind_from))
+        if kind is None and key == "outputs" and (kind := kind_of(name, unit)):
+            kind_from = "header"
+        channels.append(Channel(name, unit, kind or "other", kind_from))
     return tuple(channels)
 
 

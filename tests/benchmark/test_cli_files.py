@@ -29,7 +29,7 @@ def motor(tmp_path):
 
 
 COLUMNS = ("--input", "motor voltage", "--output", "speed")
-READ = "read: Speed as velocity (rad/s, from the header), sampling time 0.01 s from column Time\n"
+READ = "read: Speed as velocity (rad/s, by name and unit), sampling time 0.01 s from column Time\n"
 
 
 @pytest.mark.parametrize("command", [("diagnose",), ("fit", "mean"), ("data", "check")])

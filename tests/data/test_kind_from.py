@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from simgap.data import load, save
+from simgap.data.loading import read
 from simgap.records import Channel, Channels, Dataset
 from simgap.registry import DATASETS
 
@@ -41,17 +42,21 @@ def test_who_knows_a_kind_survives_saving(good, tmp_path, kind, kind_from):
 
 
 def test_an_unknown_kind_survives_saving(good, tmp_path):
-    save(with_output(load(good), Channel("phi", "deg")), tmp_path / "set")
+    save(with_output(load(good), Channel("phi", "")), tmp_path / "set")
     assert "kind" not in (tmp_path / "set" / "dataset.toml").read_text()
     assert load(tmp_path / "set").channels.outputs[0].kind_from == "unknown"
 
 
-def test_a_kind_left_out_of_a_card_is_unknown_and_one_that_is_there_is_written(good):
+def test_a_kind_left_out_of_a_card_is_told_by_name_and_unit_or_unknown_and_one_that_is_there_is_written(good):
     assert load(good).channels.outputs[0].kind_from == "written"
     card = good / "dataset.toml"
     card.write_text(card.read_text().replace('kind = "position"', ""))
+    output = load(good).channels.outputs[0]
+    assert (output.kind, output.kind_from) == ("position", "header")  # phi in deg
+    assert read(good).said == ("phi as position (deg, by name and unit)",)
+    card.write_text(card.read_text().replace('unit = "deg"', ""))
     assert load(good).channels.outputs[0].kind_from == "unknown"
-    card.write_text(card.read_text().replace('unit = "deg"', 'kind = "other"'))
+    card.write_text(card.read_text().replace('name = "phi"', 'name = "phi"\nkind = "other"'))
     assert load(good).channels.outputs[0].kind_from == "written"
 
 

@@ -30,7 +30,7 @@ HEADER = "Time (s),Motor voltage [V],Speed [rad/s]"
 BARE = "time,Motor voltage,Speed"
 CLOCK = "from column"
 GOOD = {
-    "units in square brackets": (text(HEADER, T), "read: Speed as velocity (rad/s, from the header), sampling time "
+    "units in square brackets": (text(HEADER, T), "read: Speed as velocity (rad/s, by name and unit), sampling time "
                                  "0.01 s from column Time"),
     "units in round brackets": (text("t (s),Motor voltage (V),Speed (rad/s)", T), "velocity (rad/s"),
     "units after a slash": (text("t / s,Motor voltage / V,Speed / rad/s", T), "velocity (rad/s"),
@@ -69,7 +69,7 @@ GOOD = {
     "line ends of Windows": (text(HEADER, T, end="\r\n"), CLOCK),
     "line ends of old Macs": (text(HEADER, T, end="\r", units="s,V,rad/s"), CLOCK),
     "a column of text that nobody uses": (text("t,Motor voltage,Speed,note", T).replace("\n", ",ok\n").replace(
-        "note,ok", "note"), "read: Speed as velocity (from the header), sampling time 0.01 s from column t"),
+        "note,ok", "note"), "read: Speed as velocity (by name), sampling time 0.01 s from column t"),
 }  # fmt: skip
 
 
