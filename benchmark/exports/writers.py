@@ -12,7 +12,7 @@ from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
-from simgap.greybox.simulation import Simulator, carried
+from simgap.greybox.simulation import CARRIED, Simulator, carried
 from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
@@ -71,11 +71,10 @@ class PlantWriter:
         plant, n, q = self.plant, self.plant.order, self.number
         given = {f"P{q}": self.theta, f"C{q}": plant.reading(self.theta)[: plant.ny, : max(n, 1)]}
         if n:
-            matrices = np.empty((3, n, n))
-            transition(plant.matrix(self.theta), self.h, *matrices)
+            matrices, a = np.empty((3, n, n)), plant.matrix(self.theta)
+            transition(a, self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
-            given[f"RATES{q}"] = -np.diag(plant.matrix(self.theta))
-            given[f"CARRIED{q}"] = carried(plant, plant.matrix(self.theta))
+            given[f"RATES{q}"], given[f"CARRIED{q}"] = -np.diag(a), carried(plant, a)
         return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:
@@ -134,12 +133,12 @@ class PlantWriter:
         n, fast = plant.order, min(1, plant.order - 1)
         entry = ENTRY if plant.joint else n - 1
         x, v, h = f"s[{at}]", f"s[{at + fast}]", repr(self.h)
-        pulled = " + ".join(f"CARRIED{q}[{i}] * s[{at + i}]" for i in range(min(n, 4)))
+        pulled = " + ".join(f"CARRIED{q}[{i}] * s[{at + i}]" for i in range(min(n, CARRIED - 1)))
         lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
                  '    """Advance the body by a substep, after so many."""',
                  f"    new = [0.0] * {n}", f"    t = begun * {h}", "    force = 0.0"]  # fmt: skip
         lines += [f"    force += {call}" for _, call in self.forces("force", x, v, h)]
-        load, damping = f"drive + ({pulled}) - force", f"CARRIED{q}[4] * {v}"
+        load, damping = f"drive + ({pulled}) - force", f"CARRIED{q}[{CARRIED - 1}] * {v}"
         lines += ["    hold = 0.0", *self.frictions(x, v, h, load, damping)]
         lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
         lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, {fast}, drive, force, change, hold)")

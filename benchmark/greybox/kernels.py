@@ -180,7 +180,7 @@ def run_tanks(  # noqa: PLR0912 - as above
     held = pointer(memory)
     for run in range(len(states) * experiments):
         s, experiment = run // experiments, run % experiments
-        e, g0, g1, p, theta = es[s], g0s[s], g1s[s], thetas[s], pointer(thetas[s])
+        e, g0, g1, p = es[s], g0s[s], g1s[s], pointer(thetas[s])
         u, levels, last = drive[s, experiment], states[s, experiment], rates[s, n - 1]
         for i in range(n):
             z[i] = start[s, experiment, i]
@@ -197,12 +197,12 @@ def run_tanks(  # noqa: PLR0912 - as above
                 for i in range(n):
                     flow[i] = 0.0
                 for q in range(until[FORCE]):
-                    flow[entry] += terms[q](z[0], z[0], step * h, h, theta, p_at[q], held, m_at[q])
+                    flow[entry] += terms[q](z[0], z[0], step * h, h, p, p_at[q], held, m_at[q])
                 for q in range(until[FRICTION], until[OUTFLOW]):
                     for i in range(n):
                         # In units of the last tank's level, so that one law serves tanks of any size.
                         level = z[i] * rates[s, i] / (last + 1e-300)
-                        out = last * terms[q](level, 0.0, step * h, h, theta, p_at[q], held, m_at[q])
+                        out = last * terms[q](level, 0.0, step * h, h, p, p_at[q], held, m_at[q])
                         flow[i] -= out
                         if i + 1 < n:
                             flow[i + 1] += out

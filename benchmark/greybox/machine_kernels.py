@@ -78,7 +78,7 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                 if n > 1:
                     q += 0.5 * h * (v + new)
                     for j in range(until[RIM], until[STOP]):
-                        end = min(max(q, theta[p_at[j]]), theta[p_at[j] + 1])
+                        end = min(max(q, p[p_at[j]]), p[p_at[j] + 1])
                         if q != end:
                             new = min(new, 0.0) if q > end else max(new, 0.0)
                             q = end
