@@ -41,11 +41,13 @@ def diagnose(
     save: Annotated[Path | None, typer.Option(help="Write the model that the answer ends with into this file.")] = None,
 ) -> None:
     """Show what a linear model of the data, or your own simulation, gets wrong, why, and what correcting it gains."""
+    check_writable(json, html, save)
+    reading = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
+
+    # Here, so that a file that cannot be used is refused before loops are compiled.
     from simgap.diagnosis.diagnose import diagnose
     from simgap.saved.archive import save_model
 
-    check_writable(json, html, save)
-    reading = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
     answer = diagnose(reading.dataset, seed=seed, profiles=html is not None, simulated=reading.simulated)
     if json is not None:
         write_json(json, answer.to_json())

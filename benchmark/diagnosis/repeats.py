@@ -38,11 +38,13 @@ def repeated(experiments: Sequence[Experiment], n_init: int) -> list[list[int]]:
     """Group the experiments that are runs of one input from nearly the same start, two at least."""
     sizes = sizes_of(np.concatenate([x.y for x in experiments]))
     means = [x.y[:n_init].mean(axis=0) for x in experiments]
+    spreads = [sizes_of(x.u) for x in experiments]
     groups: list[list[int]] = []
     for i, x in enumerate(experiments):
         alike = (
             group for group in groups
-            if np.all(np.abs(means[i] - means[group[0]]) <= STARTS * sizes) and _same_input(x, experiments[group[0]])
+            if np.all(np.abs(means[i] - means[group[0]]) <= STARTS * sizes)
+            and _same_input(x, experiments[group[0]], spreads[group[0]])
         )  # fmt: skip
         if (group := next(alike, None)) is None:
             groups.append([i])
@@ -51,9 +53,9 @@ def repeated(experiments: Sequence[Experiment], n_init: int) -> list[list[int]]:
     return [group for group in groups if len(group) > 1]
 
 
-def _same_input(one: Experiment, other: Experiment) -> bool:
+def _same_input(one: Experiment, other: Experiment, spread: Float[np.ndarray, " nu"]) -> bool:
     shorter, longer = sorted((len(one), len(other)))
     if shorter < OVERLAP * longer:
         return False
     a, b = one.u[:shorter], other.u[:shorter]
-    return bool(np.all(np.sqrt(np.mean((a - b) ** 2, axis=0)) <= ALIKE * sizes_of(b)))
+    return bool(np.all(np.sqrt(np.mean((a - b) ** 2, axis=0)) <= ALIKE * spread))

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.drive import Drive
 from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
-from simgap.greybox.simulation import CARRIED, Simulator, carried
+from simgap.greybox.simulation import CARRIED, carried
 from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
@@ -85,7 +86,7 @@ class PlantWriter:
         for term, value in zip(plant.remembered, local[0, plant.order :], strict=False):
             state[self.memory[term]] = np.clip(value, -1, 1) if plant.imposed and term.effect.port == "force" else value
         if plant.imposed and len(u) > 1:
-            x = Simulator(plant, u[None]).arriving(self.theta, 0, local)
+            x = Drive(plant, u[None]).arriving(self.theta, 0, local)
             state[self.motion] = (x[0, 1] - x[0, 0]) / plant.dt
 
     def held(self) -> list[int]:

@@ -64,6 +64,13 @@ def transition(a, h, e, g0, g1):  # noqa: PLR0912
                 e[i, j] = product[i, j]
 
 
+@njit(types.void(_cube, types.float64, _cube, _cube, _cube), cache=True, nogil=True)
+def transitions(a, h, e, g0, g1):
+    """Fill the transitions of S matrices a [S, n, n]."""
+    for s in range(len(a)):
+        transition(a[s], h, e[s], g0[s], g1[s])
+
+
 @njit(types.void(types.float64[::1], _matrix), cache=True, nogil=True)
 def companion(sections, a):
     """Fill A of z = (x, x', ..), from the coefficients of sections s^2 + a1 s + a0 and, last, s + a."""

@@ -285,15 +285,17 @@ class Plant:
 
     def reading(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "ny n"]:
         """Return C of y = C z, before the sensors' effects; z = (force, rate of the drive) of an imposed motion."""
-        if self.imposed:
-            return np.array([[1.0, *theta[self.layout.zeros], 0.0][:2]])
-        c = np.zeros((self.ny, self.order))
+        return self.readings(theta[None])[0]
+
+    def readings(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S ny n"]:
+        """Return C for each of several parameter vectors."""
+        c = np.zeros((len(thetas), self.ny, 2 if self.imposed else self.order))
         if self.cascade:
-            c[0, -1] = 1.0
+            c[:, 0, -1] = 1.0
             return c
         at = two_masses.MEASURED[self.joint]
-        c[0, at] = 1.0
-        c[0, 1 : 1 + self.zeros] = theta[self.layout.zeros]
+        c[:, 0, at] = 1.0
+        c[:, 0, 1 : 1 + self.zeros] = thetas[:, self.layout.zeros]
         if self.two_outputs:
-            c[1, at + 1] = theta[self.layout.velocity][0]
+            c[:, 1, at + 1] = thetas[:, self.layout.velocity][:, 0]
         return c

@@ -23,7 +23,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     """Measure the scales that effects choose bounds and starts by, for each input and each of the plant's outputs."""
     plant, records = estimate.plant, problem.records
     x, v = (signal[records.mask] for signal in problem.simulator.motion(estimate.theta, estimate.local))  # [N]
-    drive = problem.simulator.drive(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
+    drive = problem.simulator.drive.of(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
     # What would move the output by its size within the longest record, where the input does nothing.
     force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (
         1 if plant.cascade else plant.force_order

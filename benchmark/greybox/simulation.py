@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Float
 from numba import cfunc, types
 
-from simgap.greybox.effects.effect import InputEffect, OutputEffect, Role
+from simgap.greybox.drive import Drive
+from simgap.greybox.effects.effect import OutputEffect, Role
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body, run_tanks
-from simgap.greybox.linear_kernels import read, run_linear, transition
+from simgap.greybox.linear_kernels import read, run_linear, transitions
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine
 from simgap.greybox.plant import Plant
@@ -20,6 +21,7 @@ from simgap.greybox.two_masses import ENTRY
 
 ROLES = get_args(Role)  # as the kernels number them
 CARRIED = 5  # numbers: see `carried`
+FIRST = np.array([0])
 
 
 class Law(types.WrapperAddressProtocol):
@@ -60,11 +62,16 @@ def carried(plant: Plant, a: Float[np.ndarray, "n n"]) -> Float[np.ndarray, " 5"
     return c
 
 
-def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
-    """Shift u to some steps later (or, negative, earlier), standing still outside the record."""
-    if steps > 0:
-        return np.concatenate((u[:, steps:], np.repeat(u[:, -1:], steps, axis=1)), axis=1)
-    return np.concatenate((np.repeat(u[:, :1], -steps, axis=1), u[:, :steps]), axis=1) if steps else u
+def distinct(values: Float[np.ndarray, "S k"]) -> tuple[np.ndarray, np.ndarray]:
+    """List the first row and those that differ from it, and where in this list each row finds its own.
+
+    Most steps of a Jacobian leave the poles as they are, or what drives the plant.
+    """
+    if len(values) == 1:
+        return FIRST, FIRST
+    different = (values != values[0]).any(axis=1)
+    different[0] = True
+    return np.flatnonzero(different), np.where(different, np.cumsum(different) - 1, 0)
 
 
 class Simulator:
@@ -72,31 +79,21 @@ class Simulator:
 
     def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"]) -> None:
         self.plant = plant
-        self.substeps = plant.substeps
-        self.h = plant.dt / self.substeps
+        self.drive = Drive(plant, u)
+        self.substeps, self.h = self.drive.substeps, self.drive.h
         self.t = plant.dt * np.arange(u.shape[1])  # [T]
         self.shape = u.shape
-        # [nu, E, T * substeps]: each sample until the next one
-        arriving = np.repeat(np.moveaxis(u, 2, 0), self.substeps, axis=2)
-        self._u = np.ascontiguousarray(arriving)
         self._u_first = u[:, :1]
-        self._constants = self._of_machine(u) if plant.machine else None
+        self._constants = self._of_machine() if plant.machine else None
         of_command = plant.on("input", plant.nu) if plant.machine else []
         limited: list[Any] = [term.effect for term in of_command]
         self._n_commands, free = len(of_command), SLOTS - len(of_command)
         self._commands = tuple(compiled(effect.command) for effect in limited) + (compiled(nothing),) * free
         self._c_at = np.array([plant.part_of(term).start for term in of_command] + [0] * free)
-        self._of_drive = np.zeros(plant.size, dtype=bool)  # the parameters that it depends on
-        on_inputs = [term for term in plant.terms if term.effect.port == "input"]
-        for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, on_inputs)):
-            self._of_drive[part] = True
-        self._drives: dict[bytes, np.ndarray] = {}
+        self._has_sensors = any(term.effect.port == "output" for term in plant.terms)
         self._known = b"", np.empty((0, *u.shape[:2], 1))  # the states [1, E, T, n] of what was simulated last
         self._duration = plant.dt * u.shape[1]
-        middles = self.h * (np.arange(self._u.shape[2]) + 0.5)  # of the substeps
-        drifts = [term for term in plant.per_experiment if term.effect.port == "force"]
-        self._drifts = [(term, term.effect.shapes(middles, self._duration)) for term in drifts]
-        forces = [term for term in plant.on("force") if term not in drifts]
+        forces = [term for term in plant.on("force") if term not in self.drive.drifts]
         forces.sort(key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
@@ -120,21 +117,15 @@ class Simulator:
         if plant.machine is not None:
             return np.stack([self._machine(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
-        e, g0, g1 = np.empty((3, s, n, n))
-        rates = np.empty((s, n if plant.cascade else CARRIED))
         starts, begun = starts[:, :, :n], starts[:, :, n:]
-        drives = np.empty((s, *self._u.shape[1:]))
-        # Most steps of a Jacobian leave the poles as they are, or what drives the plant.
-        as_first = [(thetas[:, part] == thetas[0, part]).all(axis=1) for part in (plant.layout.poles, self._of_drive)]
-        as_first[1] &= (begun == begun[0]).all(axis=(1, 2))
-        for i, (same_poles, same_drive) in enumerate(zip(*as_first, strict=True)):
-            drives[i] = drives[0] if i and same_drive else self.drive(thetas[i], begun[i])
-            if i and same_poles:
-                e[i], g0[i], g1[i], rates[i] = e[0], g0[0], g1[0], rates[0]
-                continue
-            a = plant.matrix(thetas[i])
-            transition(a, self.h, e[i], g0[i], g1[i])
-            rates[i] = -np.diag(a) if plant.cascade else carried(plant, a)
+        of_poles, place = distinct(thetas[:, plant.layout.poles])
+        matrices = np.array([plant.matrix(theta) for theta in thetas[of_poles]])
+        steps = np.empty((3, len(matrices), n, n))
+        transitions(matrices, self.h, *steps)
+        e, g0, g1 = steps.take(place, axis=1)
+        rates = np.array([-np.diag(a) if plant.cascade else carried(plant, a) for a in matrices])[place]
+        of_drive, place = distinct(np.concatenate((thetas[:, self.drive.depends_on], begun.reshape(s, -1)), axis=1))
+        drives = self.drive.of_each(thetas[of_drive], begun[of_drive])[place]
         states = np.empty((s, experiments, samples, n))
         entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
         starts = np.ascontiguousarray(starts)
@@ -148,14 +139,9 @@ class Simulator:
         )  # fmt: skip
         return states
 
-    def _of_machine(self, u: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Take gain, supply and enabled [E, T] from the columns of a machine."""
-        machine = self.plant.machine
-        assert machine is not None
-        known = machine.known
-        on = u[:, :, machine.names.index(known.enabled)] if known.enabled else np.ones(u.shape[:2])
-        columns = (machine.column(u, known.gain, 1.0), machine.column(u, known.supply, 1.0), on)
-        return tuple(np.ascontiguousarray(column) for column in columns)
+    def _of_machine(self) -> tuple[np.ndarray, ...]:
+        """Take gain, supply and enabled [E, T] at the samples."""
+        return tuple(np.ascontiguousarray(column[:, :: self.substeps]) for column in self.drive.of_machine())
 
     def _machine(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E n"]) -> Float[np.ndarray, "E T n"]:
         """Simulate a machine of which something is known."""
@@ -163,7 +149,7 @@ class Simulator:
         assert machine is not None and self._constants is not None
         gain, supply, on = self._constants
         known, states = machine.known, np.empty((*self.shape[:2], plant.order))
-        goal = self.arriving(theta, machine.of_drive, start)
+        goal = self.drive.arriving(theta, machine.of_drive, start)
         if machine.controlled and known.goal_factor != 1.0:
             goal = goal * known.goal_factor
         inertias, weights = machine.moments(self._u_first, theta)
@@ -181,7 +167,7 @@ class Simulator:
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
         n = self.plant.n_start
         begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
-        drive, motion = self.drive(theta, start), np.ascontiguousarray(self.arriving(theta, 0, start))
+        drive, motion = self.drive.of(theta, start), np.ascontiguousarray(self.drive.arriving(theta, 0, start))
         follow_motion(
             drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
             self._memory, states,
@@ -193,66 +179,10 @@ class Simulator:
     ) -> tuple[Float[np.ndarray, "E T"], Float[np.ndarray, "E T"]]:
         """Simulate position and velocity, as the forces see them."""
         if self.plant.imposed:
-            x = self.arriving(theta, 0, local)
+            x = self.drive.arriving(theta, 0, local)
             return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
         states = self.states(theta[None], local[None, :, : self.plant.n_moving])[0]
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
-
-    def drive(
-        self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
-    ) -> Float[np.ndarray, "E K"]:
-        """Compute b u + d after the actuators' effects, for every substep, and the drifts of the load.
-
-        `start` is what the terms remember, then the numbers of each drift.
-        """
-        plant = self.plant
-        if plant.machine is not None:
-            return self._torque(theta)
-        gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
-        total = np.full(self._u.shape[1:], offset[0] if len(offset) else 0.0)
-        for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
-            arriving = self.arriving(theta, channel, start)
-            for tap, gain in zip(plant.taps, of_channel, strict=True):
-                total += gain * shifted(arriving, tap * self.substeps)
-        if start is None:
-            return total
-        for term, shapes in self._drifts:
-            part = plant.own_part_of(term)
-            total += start[:, part.start - plant.order : part.stop - plant.order] @ shapes
-        return total
-
-    def _torque(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
-        """Compute what drives a machine: k V e u, or with a controller what the goal's distance from its mean asks."""
-        machine = self.plant.machine
-        assert machine is not None and self._constants is not None
-        gain, supply, on = (np.repeat(column, self.substeps, axis=1) for column in self._constants)
-        goal = self._u[machine.of_drive]
-        command = gain * (goal - goal.mean()) * machine.known.goal_factor if machine.controlled else goal
-        return theta[self.plant.layout.gains.start] * supply * on * command
-
-    def arriving(
-        self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None
-    ) -> Float[np.ndarray, "E K"]:
-        """Pass one input through its effects; the answer is kept, because most parameters do not change it."""
-        terms = self.plant.on("input", channel)
-        if not terms:
-            return self._u[channel]
-        values = [theta[self.plant.part_of(term)] for term in terms]
-        remembered = () if start is None else zip(self.plant.remembered, start.T, strict=False)
-        begun = {term.key: of_term for term, of_term in remembered if term in terms}
-        key = np.concatenate([[channel], *values, *begun.values()]).tobytes()
-        if key not in self._drives:
-            u = self._u[channel]
-            for term, p in zip(terms, values, strict=True):
-                assert isinstance(term.effect, InputEffect)
-                if term.key in begun:
-                    u = term.effect.term_from(u, p, self.h, begun[term.key])
-                else:
-                    u = term.effect.term(u, p, self.h)
-            if len(self._drives) > 1 + len(values):
-                self._drives.pop(next(iter(self._drives)))
-            self._drives[key] = u
-        return self._drives[key]
 
     def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
         """Simulate the outputs; local holds the initial state and the per-experiment parameters."""
@@ -272,11 +202,12 @@ class Simulator:
         place = {known: -1} | {key: i for i, key in enumerate(row_of)}
         which = np.array([place[key] for key in keys])
         y = np.empty((len(keys), *self.shape[:2], plant.ny))
-        readings = np.stack([plant.reading(theta) for theta in thetas])
+        readings = plant.readings(thetas)
         with np.errstate(over="ignore", invalid="ignore"):
             read(states_known, states, which, readings, y)
-            for of_run in zip(thetas, locals_, y, strict=True):
-                self._pass_sensors(*of_run)
+            if self._has_sensors:
+                for of_run in zip(thetas, locals_, y, strict=True):
+                    self._pass_sensors(*of_run)
         # The Jacobian is asked for where a fit has just been.
         self._known = keys[0], states[which[0], None] if which[0] >= 0 else states_known
         return y

@@ -1,0 +1,113 @@
+"""What drives a plant in every substep: inputs after their effects, gains, drifts of the load; no measured output."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.greybox.effects.effect import InputEffect
+from simgap.greybox.plant import Plant
+
+
+def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
+    """Shift u to some steps later (or, negative, earlier), standing still outside the record."""
+    if steps > 0:
+        return np.concatenate((u[:, steps:], np.repeat(u[:, -1:], steps, axis=1)), axis=1)
+    return np.concatenate((np.repeat(u[:, :1], -steps, axis=1), u[:, :steps]), axis=1) if steps else u
+
+
+class Drive:
+    """What drives one plant on the inputs of several experiments, u [E, T, nu]."""
+
+    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"]) -> None:
+        self.plant, self.substeps = plant, plant.substeps
+        self.h = plant.dt / plant.substeps
+        # [nu, E, K]: each sample until the next one
+        self.u = np.ascontiguousarray(np.repeat(np.moveaxis(u, 2, 0), plant.substeps, axis=2))
+        self._arrived: dict[bytes, np.ndarray] = {}
+        middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
+        self.drifts = [term for term in plant.per_experiment if term.effect.port == "force"]
+        self._shapes = [term.effect.shapes(middles, plant.dt * u.shape[1]) for term in self.drifts]
+        effects = [term for term in plant.terms if term.effect.port == "input"]
+        self.depends_on = np.zeros(plant.size, dtype=bool)  # which of theta
+        for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, effects)):
+            self.depends_on[part] = True
+        self._inputs: np.ndarray | None = None  # [nu * taps, E * K], where nothing but gains stands before the plant
+        if not effects and not self.drifts and plant.machine is None:
+            taps = [shifted(one, tap * plant.substeps) for one in self.u for tap in plant.taps]
+            self._inputs = np.array(taps).reshape(len(taps), -1)
+
+    def of(
+        self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
+    ) -> Float[np.ndarray, "E K"]:
+        """Compute b u + d after the actuators' effects, for every substep, and the drifts of the load.
+
+        `start` is what the terms remember, then the numbers of each drift.
+        """
+        plant = self.plant
+        if plant.machine is not None:
+            return self._torque(theta)
+        gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
+        total = np.full(self.u.shape[1:], offset[0] if len(offset) else 0.0)
+        for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
+            arriving = self.arriving(theta, channel, start)
+            for tap, gain in zip(plant.taps, of_channel, strict=True):
+                total += gain * shifted(arriving, tap * self.substeps)
+        if start is None:
+            return total
+        for term, shapes in zip(self.drifts, self._shapes, strict=True):
+            part = plant.own_part_of(term)
+            total += start[:, part.start - plant.order : part.stop - plant.order] @ shapes
+        return total
+
+    def of_each(
+        self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E m"]
+    ) -> Float[np.ndarray, "S E K"]:
+        """Compute the same for several parameter vectors."""
+        if self._inputs is None:
+            return np.stack([self.of(*of_run) for of_run in zip(thetas, starts, strict=True)])
+        drives = thetas[:, self.plant.layout.gains] @ self._inputs
+        if self.plant.offset:
+            drives += thetas[:, self.plant.layout.offset]
+        return drives.reshape(-1, *self.u.shape[1:])
+
+    def arriving(
+        self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None
+    ) -> Float[np.ndarray, "E K"]:
+        """Pass one input through its effects; the answer is kept, because most parameters do not change it."""
+        terms = self.plant.on("input", channel)
+        if not terms:
+            return self.u[channel]
+        values = [theta[self.plant.part_of(term)] for term in terms]
+        remembered = () if start is None else zip(self.plant.remembered, start.T, strict=False)
+        begun = {term.key: of_term for term, of_term in remembered if term in terms}
+        key = np.concatenate([[channel], *values, *begun.values()]).tobytes()
+        if key not in self._arrived:
+            u = self.u[channel]
+            for term, p in zip(terms, values, strict=True):
+                assert isinstance(term.effect, InputEffect)
+                if term.key in begun:
+                    u = term.effect.term_from(u, p, self.h, begun[term.key])
+                else:
+                    u = term.effect.term(u, p, self.h)
+            if len(self._arrived) > 1 + len(values):
+                self._arrived.pop(next(iter(self._arrived)))
+            self._arrived[key] = u
+        return self._arrived[key]
+
+    def of_machine(self) -> tuple[np.ndarray, ...]:
+        """Take gain, supply and enabled [E, K] from the columns of a machine."""
+        machine = self.plant.machine
+        assert machine is not None
+        known, u = machine.known, np.moveaxis(self.u, 0, 2)
+        on = u[:, :, machine.names.index(known.enabled)] if known.enabled else np.ones(u.shape[:2])
+        return machine.column(u, known.gain, 1.0), machine.column(u, known.supply, 1.0), on
+
+    def _torque(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "E K"]:
+        """Compute what drives a machine: k V e u, or with a controller what the goal's distance from its mean asks."""
+        machine = self.plant.machine
+        assert machine is not None
+        gain, supply, on = self.of_machine()
+        goal = self.u[machine.of_drive]
+        command = gain * (goal - goal.mean()) * machine.known.goal_factor if machine.controlled else goal
+        return theta[self.plant.layout.gains.start] * supply * on * command
