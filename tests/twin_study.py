@@ -40,9 +40,9 @@ class Case:
 
 
 def design(twins: Twins, data: Dataset, seed: int) -> NextRecord:
-    """Ask for the next record within the limits of the twins."""
+    """Ask for the next record within the limits of the twins, of the length that `next` chooses."""
     span, travel = (-twins.largest, twins.largest), (-twins.travel, twins.travel)
-    return next_record(data, seed=seed, input_range=span, rate=1e9, seconds=twins.seconds, travel=travel)
+    return next_record(data, seed=seed, input_range=span, rate=1e9, travel=travel)
 
 
 def is_open(twins: Twins, answer: NextRecord, truth: str, twin: str) -> bool:

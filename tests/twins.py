@@ -44,7 +44,6 @@ class Twins:
     weak: Callable[[Rng, int], np.ndarray]  # input of one record at hand, of so many samples
     samples: int
     noise: float  # unit of the output
-    seconds: float  # of the record to design
     largest: float  # input, either way
     travel: float  # output, either way
     known: dict[str, object] | None = None
@@ -109,21 +108,21 @@ NOMINAL = Machine(replace(ARM, start=(0.0, 0.0), gain=8.0, damping=3.0), {"gravi
 PAIRS = {
     "delay or lag": Twins(
         {"input_delay": Machine(CART, {"delay": 0.1}), "actuator_lag": Machine(CART, {"lag": 0.1})},
-        slow(4.0, 5, 20, 3), 120, 0.05, 5.0, 4.0, 1.6,
+        slow(4.0, 5, 20, 3), 120, 0.05, 4.0, 1.6,
     ),
     "spring or sine": Twins(
         {"cubic_stiffness": Machine(replace(ARM, stiffness=20.0), {"stiffness3": -20 / 6}),
          "gravity": Machine(ARM, {"gravity": 20.0})},
-        lambda rng, n: 1.4 * steps(n, 15, 40, rng), 150, 0.02, 8.0, 3.0, 2.2,
+        lambda rng, n: 1.4 * steps(n, 15, 40, rng), 150, 0.02, 3.0, 2.2,
     ),
     "friction or dead zone": Twins(
         {"coulomb_friction": Machine(BRISK, {"coulomb": 2.4}), "dead_zone": Machine(BRISK, {"dead_zone": 0.75})},
-        slow(3.0, 12, 24, 2), 250, 0.1, 5.0, 4.0, 1.6,
+        slow(3.0, 12, 24, 2), 250, 0.1, 4.0, 1.6,
     ),
     "motor or arm": Twins(
         {"gain": Machine(replace(NOMINAL.rig, gain=6.0), NOMINAL.hidden),
          "inertia": Machine(replace(NOMINAL.rig, gain=6.0, damping=2.25), {"gravity": 0.75 * HANGS})},
-        slow(3.0, 1, 20, 3), 60, 0.05, 1.6, 3.0, 1.5,
+        slow(3.0, 1, 20, 3), 60, 0.05, 3.0, 1.5,
         {"mass": "0.5 kg", "arm": "1 m", "gravity": True}, NOMINAL,
     ),
 }  # fmt: skip

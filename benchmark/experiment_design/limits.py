@@ -37,6 +37,10 @@ class Limits:
         """Length of the record in samples."""
         return max(2, round(self.seconds / self.dt))
 
+    def longer(self, times: int) -> Limits:
+        """Return the same limits for a longer record."""
+        return replace(self, seconds=min(times * self.seconds, max(self.seconds, LONGEST * self.dt)))
+
     def relaxed(self, factor: float = 2.0) -> dict[str, Limits]:
         """Return the limits with each of them in turn, and then all, wider by a factor."""
         middle, half = (self.low + self.high) / 2, factor * (self.high - self.low) / 2

@@ -10,12 +10,14 @@ from simgap.data.formats.plant_table import with_known
 from simgap.data.kinds import with_kinds
 from simgap.data.loading import read
 from simgap.diagnosis import doubts
-from simgap.experiment_design.answer import CERTAIN, NextRecord, is_alike
+from simgap.experiment_design.answer import CERTAIN, NextRecord, is_alike, narrowed
 from simgap.experiment_design.limits import Limits, Range, limits_of
-from simgap.experiment_design.rivals import Question, question_of
+from simgap.experiment_design.rivals import WIDE, Question, question_of
 from simgap.experiment_design.search import Design, best_record
 from simgap.greybox.identification import Identified, identify
 from simgap.records import Channels, Dataset
+
+LENGTHS = (1, 2, 4)  # of the record, times that of the longest training record
 
 
 def next_record(
@@ -35,8 +37,9 @@ def next_record(
 
     `data`, `inputs`, `outputs`, `dt`, `kind` and `known` as in `simgap.diagnose`. Limits of the record: the range of
     the input, its rate (in its unit per second), its length in seconds, and the travel of the output; where there are
-    several inputs or outputs, by their names. What is left out is taken from the training records. `seed` draws the
-    signals that are tried. Raises UnusableInput.
+    several inputs or outputs, by their names. What is left out is taken from the training records; the record is up to
+    four times as long as these, where a shorter one would not decide. `seed` draws the signals that are tried. Raises
+    UnusableInput.
     """
     dataset = data if isinstance(data, Dataset) else read(data, inputs, outputs, dt).dataset
     dataset = with_known(with_kinds(dataset, kind), known)
@@ -50,11 +53,38 @@ def next_record(
         questions = [question_of(one) for one in identified]
         design, wider = None, {}
         if any(question.pairs for question in questions):
-            design = best_record(questions, limits, seed)
             rivals = any(question.pairs and not question.interval for question in questions)
+            lengths = LENGTHS if seconds is None else LENGTHS[:1]
+            limits, design = _long_enough(questions, limits, seed, lengths)
             if rivals and (design is None or design.chance < CERTAIN):
                 wider = _wider(questions, limits, design, seed)
     return NextRecord(dataset.name, channels, limits, tuple(questions), design, wider, _untold(identified, channels))
+
+
+def _long_enough(
+    questions: Sequence[Question], limits: Limits, seed: int, lengths: Sequence[int]
+) -> tuple[Limits, Design | None]:
+    """Design the shortest record of these lengths, times the usual, that settles all; else what separates the most."""
+    found: list[tuple[Limits, Design]] = []
+    for times in lengths:
+        longer = limits.longer(times)
+        design = best_record(questions, longer, seed)
+        if design is not None:
+            found.append((longer, design))
+            if _settles(questions, design):
+                break
+    return max(found, key=lambda one: one[1].worth, default=(limits, None))
+
+
+def _settles(questions: Sequence[Question], design: Design) -> bool:
+    """Tell whether a record decides between rivals that any can, and leaves no interval that is worth another one."""
+    asked = [question for question in questions for _ in question.pairs]
+    return all(
+        narrowed(min(one.d)) * question.width <= WIDE
+        if question.width
+        else one.chance >= CERTAIN or is_alike(one, [design])
+        for question, one in zip(asked, design.separated, strict=True)
+    )
 
 
 def _wider(questions: Sequence[Question], limits: Limits, design: Design | None, seed: int) -> dict[str, Design | None]:

@@ -76,7 +76,7 @@ class Question:
     """The models of one plant that are left, the best first, and the pairs of them that a record should tell apart.
 
     Without pairs nothing is left open. `interval` names the number of an effect whose interval they are the ends of,
-    where the effects themselves are decided.
+    where the effects themselves are decided; `width` is half of an interval's, as a share of the value.
     """
 
     rivals: tuple[Rival, ...]
@@ -85,6 +85,7 @@ class Question:
     records: Records
     outputs: tuple[int, ...]
     interval: str = ""
+    width: float = 0.0
 
 
 def question_of(identified: Identified) -> Question:
@@ -114,8 +115,8 @@ def question_of(identified: Identified) -> Question:
         return Question(tuple(rivals), tuple((0, i) for i in range(1, len(rivals))), *of_plant)
     ends = _ends(identified, rivals[0], baseline, noise)
     if ends is not None:
-        name, low, high = ends
-        return Question((rivals[0], low, high), ((1, 2),), *of_plant, interval=name)
+        name, width, low, high = ends
+        return Question((rivals[0], low, high), ((1, 2),), *of_plant, interval=name, width=width)
     return Question(tuple(rivals), (), *of_plant)
 
 
@@ -166,7 +167,9 @@ def rival_of(
     return Rival(title, fit, held, np.nan_to_num(information), behind)
 
 
-def _ends(identified: Identified, best: Rival, baseline: Baseline, noise: Noise) -> tuple[str, Rival, Rival] | None:
+def _ends(
+    identified: Identified, best: Rival, baseline: Baseline, noise: Noise
+) -> tuple[str, float, Rival, Rival] | None:
     """Fit the model with its least certain number at either end of the 95 % interval."""
     plant, theta = best.estimate.plant, best.estimate.theta
     if identified.plant.estimate.plant.terms != plant.terms or identified.linear is not None:
@@ -193,7 +196,7 @@ def _ends(identified: Identified, best: Rival, baseline: Baseline, noise: Noise)
         ends.append((f"{name} {amount(value, unit)}{gain}", end))
     (of_low, lower), (of_high, upper) = ends
     of_effect = name if plant.machine is None else ""
-    return of_effect, replace(lower, title=of_low), replace(upper, title=of_high)
+    return of_effect, wide[i], replace(lower, title=of_low), replace(upper, title=of_high)
 
 
 def _is_free(rival: Rival, i: int) -> bool:

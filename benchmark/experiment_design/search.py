@@ -55,6 +55,11 @@ class Design:
         """The chance that it decides the pair that it decides least."""
         return min((one.chance for one in self.separated), default=0.0)
 
+    @property
+    def worth(self) -> float:
+        """What it separates, over all pairs, as the search compares records."""
+        return float(_worth(np.array([min(one.d) for one in self.separated])).sum())
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -86,11 +91,7 @@ def best_record(questions: Sequence[Question], limits: Limits, seed: int, rounds
         near = [_varied(one, limits, rng) for _, one in ranked[:BEST] for _ in range(VARIANTS)]
         ranked = sorted([*ranked[:BEST], *_ranked(questions, limits, near)], key=lambda pair: -pair[0])
     designs = [_design(questions, limits, candidate) for _, candidate in ranked[:REFITTED]]
-    return max(designs, key=_worth_of, default=None)
-
-
-def _worth_of(design: Design) -> float:
-    return float(_worth(np.array([min(one.d) for one in design.separated])).sum())
+    return max(designs, key=lambda design: design.worth, default=None)
 
 
 def _another(shape: Shape, i: int) -> Shape:

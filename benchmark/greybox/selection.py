@@ -83,8 +83,7 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     """
     search = _Search(baseline, extended=dict(extended or {}))
     trial = search.visible(assess(baseline, baseline.estimate, 0))
-    if baseline.plant.machine is None:
-        trial = search.forward(trial, "linear")
+    trial = search.forward(trial, "linear")
     trial = search.settled(search.forward(trial, "forecast"), "forecast")
     # Where an exchange found a better fit, others may join that one; what is known beside this fit is not fitted again.
     larger = search.forward(trial, "forecast")

@@ -1,13 +1,18 @@
 """`simgap next --among`: records that could be taken are ranked by how well all of them could be simulated."""
 
 import json
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from choice_study import of_runs
 
 import simgap
 from simgap.cli import main
+from simgap.data.formats.plant_table import with_known
+from simgap.data.measured.servo_sts3215 import PLANT
 from simgap.data.simulated.rigs import hide
 from simgap.experiment_design.choice import ranked
 from simgap.greybox.fitting import descend
@@ -145,3 +150,21 @@ def test_where_nothing_is_new_the_answer_says_so(data, identified):
 def test_limits_are_refused_beside_candidates(tmp_path, capsys):
     assert main(["next", "daisy_hairdryer", "--among", str(tmp_path), "--seconds", "3"]) == 2
     assert "leave out limits" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_few_runs_of_a_measured_servo_show_that_its_rate_is_limited_and_that_it_has_friction():
+    """Beside a limited rate alone, a force of one run stood in the way of all that acts in every run."""
+    folder = Path(os.environ.get("SIMGAP_DATA", "../shared/data")) / "measured" / "servo_sts3215"
+    if not folder.is_dir():
+        pytest.skip("servo_sts3215 is not at hand: set SIMGAP_DATA to the folder of measured data")
+    runs = [
+        "sin_sin_kp24_m0.74_l0.1", "lift_and_drop_kp8_m1.17_l0.15", "lift_and_drop_kp4_m0.54_l0.15",
+        "sin_time_square_kp8_m0.54_l0.15", "lift_and_drop_kp32_m0.74_l0.1", "sin_time_square_kp32_m1.17_l0.15",
+        "lift_and_drop_kp4_m0.74_l0.15", "sin_time_square_kp32_m0.54_l0.15", "brutal_kp4_m1.17_l0.15",
+        "sin_time_square_kp16_m0.54_l0.1", "brutal_kp24_m1.17_l0.15", "lift_and_drop_kp4_m0.54_l0.1",
+    ]  # fmt: skip
+    (found,) = identify(of_runs(with_known(simgap.load(folder), PLANT), runs).training)
+    effects = {term.effect.name for term in found.plant.estimate.plant.terms}
+    assert "rate_limit" in effects
+    assert effects & {"coulomb_friction", "load_friction", "stribeck_friction"}

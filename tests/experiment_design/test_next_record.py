@@ -43,10 +43,20 @@ def test_a_machine_that_may_run_away_stays_within_the_travel_under_the_record():
     machine = twins.machines["cubic_stiffness"]
     span, travel = (-twins.largest, twins.largest), (-twins.travel, twins.travel)
     answer = simgap.next_record(
-        twins.at_hand(machine, seed), seed=seed, input_range=span, rate=1e9, seconds=twins.seconds, travel=travel
+        twins.at_hand(machine, seed), seed=seed, input_range=span, rate=1e9, seconds=8.0, travel=travel
     )
     record = machine.record(answer.u[:, 0], 0.0, (seed, STREAMS["new"]))
     assert np.max(np.abs(record.y)) < twins.travel
+
+
+def test_the_record_is_longer_where_one_as_long_as_those_at_hand_would_not_decide():
+    twins = PAIRS["delay or lag"]
+    data, usual = twins.at_hand(twins.machines["actuator_lag"], 5), 12.0
+    span, travel = (-twins.largest, twins.largest), (-twins.travel, twins.travel)
+    answer = simgap.next_record(data, seed=5, input_range=span, rate=1e9, travel=travel)
+    assert answer.decides
+    assert answer.limits.seconds > usual
+    assert not simgap.next_record(data, seed=5, input_range=span, rate=1e9, travel=travel, seconds=usual).decides
 
 
 def test_the_record_keeps_the_limits(answer):
