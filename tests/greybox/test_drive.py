@@ -1,0 +1,36 @@
+"""What drives a plant: for several parameter vectors at once as for each alone, and one sample's steps apart."""
+
+import numpy as np
+import pytest
+from parameters_of_effects import scales
+
+from simgap.greybox.drive import Drive
+from simgap.greybox.effects.dead_zone import DeadZone
+from simgap.greybox.effects.load_drift import LoadDrift
+from simgap.greybox.plant import Plant
+from simgap.greybox.terms import PlantScales, Term
+
+
+@pytest.mark.parametrize("effects", [(), (DeadZone(),), (LoadDrift(),)])
+@pytest.mark.parametrize("taps", [(0,), (0, -1, 1)])
+@pytest.mark.parametrize("offset", [False, True])
+def test_the_drives_of_several_parameter_vectors_are_those_of_each(effects, taps, offset):
+    seen = scales("other", 2)
+    plant = Plant("other", 2, 2, 0.1, offset=offset, taps=taps, scales=PlantScales((seen,), (seen,)))
+    drive_of = plant.having([Term(effect) for effect in effects])
+    rng = np.random.default_rng(0)
+    drive = Drive(drive_of, rng.standard_normal((3, 20, 2)))
+    thetas = np.clip(rng.standard_normal((4, drive_of.size)), drive_of.low, drive_of.high)
+    starts = rng.standard_normal((4, 3, drive_of.n_moving - drive_of.order))
+    alone = np.stack([drive.of(theta, start) for theta, start in zip(thetas, starts, strict=True)])
+    np.testing.assert_allclose(drive.of_each(thetas, starts), alone, rtol=1e-12, atol=1e-12)
+
+
+def test_an_input_holds_until_the_next_sample_and_its_neighbours_act_through_their_gains():
+    plant = Plant("other", 1, 1, 0.1, taps=(0, -1, 1))
+    theta = np.zeros(plant.size)
+    theta[plant.layout.gains] = 1.0, 10.0, 100.0
+    u = np.array([1.0, 2.0, 3.0])
+    found = Drive(plant, u[None, :, None]).of(theta)[0].reshape(3, -1)
+    earlier, later = np.array([1.0, 1.0, 2.0]), np.array([2.0, 3.0, 3.0])
+    assert (found == (u + 10 * earlier + 100 * later)[:, None]).all()
