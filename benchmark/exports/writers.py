@@ -42,6 +42,8 @@ class PlantWriter:
         self.theta = fitted.estimate.theta
         self.of_theta, self.sub = f"P{number}", self.plant.substeps
         self.h = self.plant.dt / self.sub
+        if self.plant.by_rate:
+            raise UnusableInput("the input is the rate of an imposed motion, which no format takes; give its position")
         if self.plant.imposed and self.plant.zeros:
             raise UnusableInput(
                 "the model reads the rate of the imposed motion from the sample after the present one; a step knows no "

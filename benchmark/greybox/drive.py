@@ -24,6 +24,10 @@ class Drive:
         self.h = plant.dt / plant.substeps
         # [nu, E, K]: each sample until the next one
         self.u = np.ascontiguousarray(np.repeat(np.moveaxis(u, 2, 0), plant.substeps, axis=2))
+        self._rate = self.u[0].copy() if plant.by_rate else None
+        if plant.by_rate:
+            self.u[:, :, 1:] = np.cumsum(0.5 * (self.u[:, :, 1:] + self.u[:, :, :-1]) * self.h, axis=2)
+            self.u[:, :, 0] = 0.0
         self._arrived: dict[bytes, np.ndarray] = {}
         middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
         self.drifts = [term for term in plant.per_experiment if term.effect.port == "force"]
@@ -94,6 +98,17 @@ class Drive:
                 self._arrived.pop(next(iter(self._arrived)))
             self._arrived[key] = u
         return self._arrived[key]
+
+    def motion(
+        self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]
+    ) -> tuple[Float[np.ndarray, "E K"], Float[np.ndarray, "E K"]]:
+        """Compute position and velocity of an imposed motion; between two samples of a position it is even."""
+        x = np.ascontiguousarray(self.arriving(theta, 0, start))
+        if self._rate is not None:
+            return x, self._rate
+        v = np.diff(x, axis=1, prepend=x[:, :1]) / self.h
+        v[:, :1] = v[:, 1:2]
+        return x, v
 
     def of_machine(self) -> tuple[np.ndarray, ...]:
         """Take gain, supply and enabled [E, K] from the columns of a machine."""

@@ -232,6 +232,7 @@ def run_tanks(  # noqa: PLR0912 - as above
     types.void(
         _matrix,
         _matrix,
+        _matrix,
         types.float64,
         types.UniTuple(types.FunctionType(TERM), SLOTS),
         _places,
@@ -243,10 +244,10 @@ def run_tanks(  # noqa: PLR0912 - as above
         _cube,
     )
 )
-def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, memory, states):
+def follow_motion(drive, motion, velocity, dt, terms, until, theta, p_at, m_at, begun, memory, states):
     """Fill states [E, T, 2] with the force that an imposed motion [E, T] takes, and with the rate of the drive [E, T].
 
-    Between two samples the motion is even. Where it stands still, dry friction goes on holding as it did before.
+    Where it stands still, dry friction goes on holding as it did before.
     """
     p, held = pointer(theta), pointer(memory)
     for experiment in range(len(drive)):
@@ -254,9 +255,8 @@ def follow_motion(drive, motion, dt, terms, until, theta, p_at, m_at, begun, mem
             memory[i] = begun[experiment, i]
         side = 0.0
         for k in range(drive.shape[1]):
-            x, h = motion[experiment, k], dt if k > 0 else 0.0
-            before, after, last = max(k - 1, 0), min(k + 1, drive.shape[1] - 1), max(k, 1)
-            v = (motion[experiment, last] - motion[experiment, last - 1]) / dt if after > before else 0.0
+            x, v, h = motion[experiment, k], velocity[experiment, k], dt if k > 0 else 0.0
+            before, after = max(k - 1, 0), min(k + 1, drive.shape[1] - 1)
             rate = (drive[experiment, after] - drive[experiment, before]) / (max(after - before, 1) * dt)
             if v != 0.0:
                 side = 1.0 if v > 0.0 else -1.0

@@ -56,13 +56,14 @@ def find_baseline(
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
     kind = channels.outputs[outputs[0]].kind
-    models, orders = plain_models(records, held_out, kind, n_init)
+    by_rate = kind == "other" and [channel.kind for channel in channels.inputs] == ["velocity"]
+    models, orders = plain_models(records, held_out, kind, n_init, by_rate)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
     outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
-        models, orders = plain_models(records, held_out, kind, n_init)
+        models, orders = plain_models(records, held_out, kind, n_init, by_rate)
 
     def baseline_of(plain: Estimate) -> Baseline:
         plain = scaled(plain, records, channels, outputs)
@@ -70,7 +71,7 @@ def find_baseline(
 
     baseline = baseline_of(models[-1])
     to_beat = block_errors(baseline.estimate, held_out, n_init, records)
-    for simpler in (fit for fit in models[:-1] if not fit.plant.zeros):
+    for simpler in (fit for fit in models[:-1] if fit.plant.by_rate or not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
@@ -110,17 +111,23 @@ def _under_load(plain: Estimate, records: Records) -> Estimate:
 
 
 def _instead_of_order(term: Term, plant: Plant) -> bool:
-    """Tell whether an effect may explain what else asks for a higher order; behind an imposed motion, play looks so."""
-    return not term.channel and (term.effect.instead_of_order or (plant.imposed and term.effect.memory > 0))
+    """Tell whether an effect may explain what else asks for a higher order.
+
+    Behind an imposed motion play looks so; and whether its rate is that of a motion, only a friction shows.
+    """
+    effect = term.effect
+    of_force = plant.imposed and (effect.memory > 0 or (plant.by_rate and effect.role == "friction"))
+    return not term.channel and (effect.instead_of_order or of_force)
 
 
 def plain_models(
-    train: Records, valid: Records, kind: Kind, n_init: int
+    train: Records, valid: Records, kind: Kind, n_init: int, by_rate: bool = False
 ) -> tuple[list[Estimate], tuple[Estimate, ...]]:
     """Fit plain linear models: order 1 for a velocity, 2 for a position, else up to what held-out data ask for.
 
     The last one of the list is the simplest whose held-out error is within a standard error of the best, and the ones
-    before it are simpler; beside it stand all that were tried.
+    before it are simpler; beside it stand all that were tried. An input that is a velocity, `by_rate`, may be that of a
+    motion which takes a force.
     """
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
@@ -129,6 +136,9 @@ def plain_models(
     single = kind != "level" and nu == 1
     models = linear_models(train, range(3, MAX_ORDER + 1)) if single else []
     tried: list[tuple[Estimate, np.ndarray]] = []
+    if by_rate:
+        fit = fit_plain(Plant(kind, 0, nu, dt, zeros=1, offset=True, by_rate=True), train)
+        tried.append((fit, block_errors(fit, valid, n_init, train)))
     smaller: dict[bool, Estimate] = {}  # of one order less, without and with zeros
     rounds_in_vain = 0
     for order in range(kind == "level", MAX_ORDER + 1):

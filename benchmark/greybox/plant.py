@@ -48,7 +48,8 @@ class Plant:
 
     A joint (`joint` says which side is measured): two masses of order 4, see `two_masses`; forces act on the motor.
 
-    Order 0, a motion imposed on the machine and the force that it takes: y = b u + c1 b u' + d - forces(u, u').
+    Order 0, a motion imposed on the machine and the force that it takes: y = b u + c1 b u' + d - forces(u, u'). With
+    `by_rate` the input is the rate of that motion x, which begins at zero: y = b x + c1 u + d - forces(x, u).
     """
 
     kind: Kind
@@ -57,6 +58,7 @@ class Plant:
     dt: float
     zeros: int = 0
     two_outputs: bool = False
+    by_rate: bool = False
     offset: bool = False
     # Which samples of the input act in the interval after sample 0, with one gain each. An input that is held needs
     # just that one; the mean of one that runs on smoothly to the next sample is a combination of those around it.

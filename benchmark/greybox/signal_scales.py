@@ -24,23 +24,27 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     plant, records = estimate.plant, problem.records
     x, v = (signal[records.mask] for signal in problem.simulator.motion(estimate.theta, estimate.local))  # [N]
     drive = problem.simulator.drive.of(estimate.theta)[:, :: problem.simulator.substeps][records.mask]
+    arriving = problem.simulator.drive.u[:, :, :: problem.simulator.substeps]
     # What would move the output by its size within the longest record, where the input does nothing.
     force = float(np.std(drive)) or float(records.sizes[0]) / records.duration ** (
         1 if plant.cascade else plant.force_order
     )
     size = float(records.sizes[0])
+    force = size if plant.by_rate else force  # what drives such a motion is not measured
     x_max = float(np.max(np.abs(x))) or size
     v_max = float(np.max(np.abs(v))) or size / records.duration
 
+    rate = "/s" if plant.by_rate else ""
+
     def scales(i: int, j: int) -> SignalScales:
-        u, y = records.u[records.mask][:, i], records.y[records.mask][:, j]
+        u, y = arriving[i][records.mask], records.y[records.mask][:, j]
         return SignalScales(
             kind=plant.kind, order=plant.force_order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
             x_max=x_max, v_max=v_max, stroke=x_max if plant.order != 1 else _stroke(x, v_max, records),
             force_rms=force,
-            u_unit=channels.inputs[i].unit, y_unit=channels.outputs[outputs[j]].unit,
+            u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
             lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 

@@ -167,11 +167,13 @@ class Simulator:
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
         n = self.plant.n_start
         begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
-        drive, motion = self.drive.of(theta, start), np.ascontiguousarray(self.drive.arriving(theta, 0, start))
+        x, v = self.drive.motion(theta, start)
         follow_motion(
-            drive, motion, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, begun,
-            self._memory, states,
+            self.drive.of(theta, start), x, v, self.h, self._terms, self._until, np.ascontiguousarray(theta),
+            self._p_at, self._m_at, begun, self._memory, states,
         )  # fmt: skip
+        if self.plant.by_rate:
+            states[:, :, 1] = v
         return states
 
     def motion(
@@ -179,8 +181,7 @@ class Simulator:
     ) -> tuple[Float[np.ndarray, "E T"], Float[np.ndarray, "E T"]]:
         """Simulate position and velocity, as the forces see them."""
         if self.plant.imposed:
-            x = self.drive.arriving(theta, 0, local)
-            return x, np.diff(x, axis=1, prepend=x[:, :1]) / self.h
+            return self.drive.motion(theta, local)
         states = self.states(theta[None], local[None, :, : self.plant.n_moving])[0]
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 

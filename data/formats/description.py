@@ -118,7 +118,7 @@ def _channels(entries: Any, key: str, file: Path) -> tuple[Channel, ...]:
             raise UnusableInput(f"{file}: {key} has the kind_from {short(kind_from)}; {known} can stand beside a kind")
         name = _text(entry["name"], f"name of {key}", file)
         unit = _text(entry.get("unit", ""), f"unit of {key}", file, may_be_empty=True)
-        if kind is None and key == "outputs" and (kind := kind_of(name, unit)):
+        if kind is None and (kind := kind_of(name, unit)):
             kind_from = "header"
         channels.append(Channel(name, unit, kind or "other", kind_from))
     return tuple(channels)

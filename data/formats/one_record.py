@@ -98,7 +98,7 @@ def _channels(table: Table, inputs: Sequence[str], outputs: Sequence[str]) -> Ch
     for column in (*inputs, *outputs):
         heading = table.heading(column)
         name = heading.name if names.count(heading.name) == 1 else column
-        kind = kind_of(heading.name, heading.unit) if len(made) >= len(inputs) else None
+        kind = kind_of(heading.name, heading.unit)
         made.append(Channel(name, heading.unit, kind, "header") if kind else Channel(name, heading.unit))
     return Channels(tuple(made[: len(inputs)]), tuple(made[len(inputs) :]))
 

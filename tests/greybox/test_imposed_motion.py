@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from simgap.diagnosis.diagnose import diagnose
 from simgap.records import Channel, Channels, Dataset, TrainingSet
@@ -86,3 +87,46 @@ def test_a_spring_with_a_damper_has_nothing_to_name(seed):
         return 0.3 * x + 0.05 * np.gradient(x, DT)
 
     assert first_name(diagnose(dataset(respond, seed), views_too=False)) == ("nothing_found",)
+
+
+def of_velocity(respond, seed):
+    """What a velocity [E, T] in mm/s brings about, with noise of 2 %."""
+    rng = np.random.default_rng(seed)
+    v = np.gradient(strokes(rng, 6, 400), DT, axis=1)
+    y = respond(v)
+    made = experiments(v, (y + 0.02 * y.std() * rng.standard_normal(y.shape))[:, :, None], DT)
+    channels = Channels((Channel("v", "mm/s", "velocity"),), (Channel("y", "", "other"),))
+    return Dataset(
+        "by rate", TrainingSet(tuple(made[:3]), tuple(made[3:4]), 10, channels), tuple(made[4:]), 10, channels
+    )
+
+
+@pytest.mark.parametrize(
+    ("respond", "name", "number"),
+    [
+        (lambda v: 0.1 * v + 3.0 * np.sign(v), "coulomb_friction", 3.0),
+        pytest.param(lambda v: 0.1 * v + 0.002 * v * np.abs(v), "quadratic_drag", 0.002, marks=pytest.mark.slow),
+    ],
+)
+def test_of_a_machine_whose_velocity_is_imposed_the_force_is_named_with_its_size(respond, name, number):
+    answer = diagnose(of_velocity(respond, seed=1), views_too=False)
+    assert first_name(answer) == ("named", name)
+    assert answer.causes[0].parameters[0].value == pytest.approx(number, rel=0.05)
+
+
+@pytest.mark.slow
+def test_of_a_machine_whose_velocity_is_imposed_a_spring_that_slips_is_hysteresis():
+    def respond(v):
+        motions = DT * np.cumsum(v, axis=1)
+        return 0.02 * v + np.stack([slipping(x, 4.0, 0.0, 5.0, 0.0) for x in motions])
+
+    answer = diagnose(of_velocity(respond, seed=2), views_too=False)
+    assert first_name(answer) == ("named", "hysteresis")
+
+
+def test_what_a_velocity_only_drives_keeps_its_poles():
+    """The air along a hot wire is no motion that takes a force."""
+    decay = np.exp(-DT / 0.3)
+    answer = diagnose(of_velocity(lambda v: lfilter([0.0, 1 - decay], [1.0, -decay], 0.1 * v), seed=3), views_too=False)
+    assert not answer.causes
+    assert answer.to_json()["baseline"]["order"] > 0
