@@ -163,7 +163,7 @@ class Simulator:
         return states
 
     def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
-        """Compute the forces that the motion takes, and the rates of the drive."""
+        """Compute the forces that the motion takes, and the rate that c1 multiplies: of the drive, or of the motion."""
         states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
         n = self.plant.n_start
         begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
