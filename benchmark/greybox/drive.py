@@ -107,7 +107,7 @@ class Drive:
         if self._rate is not None:
             return x, self._rate
         v = np.diff(x, axis=1, prepend=x[:, :1]) / self.h
-        v[:, :1] = v[:, 1:2]
+        v[:, 0] = v[:, min(1, v.shape[1] - 1)]
         return x, v
 
     def of_machine(self) -> tuple[np.ndarray, ...]:

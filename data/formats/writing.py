@@ -77,6 +77,8 @@ def _toml(dataset: Dataset, time: str | None) -> str:
         for channel in channels:
             lines += ["", f"[[{key}]]", f"name = {_quoted(channel.name)}"]
             lines.append(f"unit = {_quoted(channel.unit)}")
+            if key == "inputs" and channel.kind_from != "written":
+                continue  # its name and unit tell it again
             if channel.kind_from != "unknown" or channel.kind != "other":
                 lines.append(f"kind = {_quoted(channel.kind)}")
             if channel.kind_from in NOT_WRITTEN:
