@@ -32,7 +32,7 @@ class UnusableInput(ValueError):
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of `u` or `y`: its name, its physical unit and, for outputs, what kind of motion it is.
+    """One column of `u` or `y`: its name, its physical unit and what kind of motion it is.
 
     `kind_from` says who knows the kind: somebody wrote it (also in Python), its name and unit told it, an option
     did, the records showed it, or nobody knows. A kind that is left out is "other" and unknown. Channels are equal

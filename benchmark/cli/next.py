@@ -57,10 +57,7 @@ def next_record(
     With --among nothing is designed: records that could be taken are ranked by how well all of them could be simulated
     afterwards.
     """
-    from simgap.experiment_design.choice import Choice, choose_record
-    from simgap.experiment_design.next_record import NextRecord, next_record
     from simgap.records import UnusableInput
-    from simgap.reports.rendering import printable
 
     check_writable(out, json)
     if among is not None and any((input_range, rate, seconds, travel, out)):
@@ -68,6 +65,12 @@ def next_record(
     spans = [parse_limits(name, given or (), 2) for name, given in (("input-range", input_range), ("travel", travel))]
     rates = parse_limits("rate", rate or (), 1)
     dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
+
+    # Here, so that a file that cannot be used is refused before loops are compiled.
+    from simgap.experiment_design.choice import Choice, choose_record
+    from simgap.experiment_design.next_record import NextRecord, next_record
+    from simgap.reports.rendering import printable
+
     answer: Choice | NextRecord
     if among is not None:
         answer = choose_record(dataset, among)

@@ -33,7 +33,7 @@ class MachineWriter(PlantWriter):
 
     def constants(self) -> dict[str, np.ndarray]:
         """Give the parameters, and the row that the output reads."""
-        return {self.of_theta: self.theta, f"C{self.number}": self.plant.reading(self.theta).ravel()}
+        return {self.of_theta: self.theta, f"C{self.number}": self.plant.readings(self.theta[None]).ravel()}
 
     def held(self) -> list[int]:
         """List the columns of mass, arm, inertia and the controller's gain."""

@@ -72,7 +72,7 @@ class PlantWriter:
     def constants(self) -> dict[str, np.ndarray]:
         """Give the parameters, the transition over a substep, and the rows that the outputs read."""
         plant, n, q = self.plant, self.plant.order, self.number
-        given = {f"P{q}": self.theta, f"C{q}": plant.reading(self.theta)[: plant.ny, : max(n, 1)]}
+        given = {f"P{q}": self.theta, f"C{q}": plant.readings(self.theta[None])[0, : plant.ny, : max(n, 1)]}
         if n:
             matrices, a = np.empty((3, n, n)), plant.matrix(self.theta)
             transition(a, self.h, *matrices)

@@ -24,10 +24,11 @@ class Drive:
         self.h = plant.dt / plant.substeps
         # [nu, E, K]: each sample until the next one
         self.u = np.ascontiguousarray(np.repeat(np.moveaxis(u, 2, 0), plant.substeps, axis=2))
-        self._rate = self.u[0].copy() if plant.by_rate else None
+        self._rate: np.ndarray | None = None  # [E, K], of an imposed motion, where it is the input
         if plant.by_rate:
-            self.u[:, :, 1:] = np.cumsum(0.5 * (self.u[:, :, 1:] + self.u[:, :, :-1]) * self.h, axis=2)
-            self.u[:, :, 0] = 0.0
+            v = self._rate = self.u[0]
+            self.u = np.zeros_like(self.u)
+            self.u[0, :, 1:] = np.cumsum(0.5 * (v[:, 1:] + v[:, :-1]) * self.h, axis=1)
         self._arrived: dict[bytes, np.ndarray] = {}
         middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
         self.drifts = [term for term in plant.per_experiment if term.effect.port == "force"]

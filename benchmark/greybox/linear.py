@@ -136,9 +136,6 @@ def plain_models(
     single = kind != "level" and nu == 1
     models = linear_models(train, range(3, MAX_ORDER + 1)) if single else []
     tried: list[tuple[Estimate, np.ndarray]] = []
-    if by_rate:
-        fit = fit_plain(Plant(kind, 0, nu, dt, zeros=1, offset=True, by_rate=True), train)
-        tried.append((fit, block_errors(fit, valid, n_init, train)))
     smaller: dict[bool, Estimate] = {}  # of one order less, without and with zeros
     rounds_in_vain = 0
     for order in range(kind == "level", MAX_ORDER + 1):
@@ -158,6 +155,9 @@ def plain_models(
             tried += here
         if rounds_in_vain == 2:
             break
+    if by_rate:  # beside them all: what it simulates worse or better says nothing of the next order
+        fit = fit_plain(Plant(kind, 0, nu, dt, zeros=1, offset=True, by_rate=True), train)
+        tried.insert(0, (fit, block_errors(fit, valid, n_init, train)))
     fits = tuple(fit for fit, _ in tried)  # from the simplest on
     return list(fits[: 1 + as_good_as_best([squares for _, squares in tried])]), fits
 

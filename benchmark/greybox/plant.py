@@ -285,12 +285,8 @@ class Plant:
         companion(sections, a)
         return a
 
-    def reading(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "ny n"]:
-        """Return C of y = C z, before the sensors' effects; z = (force, rate of the drive) of an imposed motion."""
-        return self.readings(theta[None])[0]
-
     def readings(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S ny n"]:
-        """Return C for each of several parameter vectors."""
+        """Return C of y = C z, before the sensors' effects; z = (force, rate) of an imposed motion."""
         c = np.zeros((len(thetas), self.ny, 2 if self.imposed else self.order))
         if self.cascade:
             c[:, 0, -1] = 1.0

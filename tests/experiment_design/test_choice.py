@@ -1,9 +1,7 @@
 """`simgap next --among`: records that could be taken are ranked by how well all of them could be simulated."""
 
 import json
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,11 +151,11 @@ def test_limits_are_refused_beside_candidates(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_few_runs_of_a_measured_servo_show_that_its_rate_is_limited_and_that_it_has_friction():
+def test_a_few_runs_of_a_measured_servo_show_that_its_rate_is_limited_and_that_it_has_friction(measured):
     """Beside a limited rate alone, a force of one run stood in the way of all that acts in every run."""
-    folder = Path(os.environ.get("SIMGAP_DATA", "../shared/data")) / "measured" / "servo_sts3215"
+    folder = measured / "measured" / "servo_sts3215"
     if not folder.is_dir():
-        pytest.skip("servo_sts3215 is not at hand: set SIMGAP_DATA to the folder of measured data")
+        pytest.skip("servo_sts3215 is not at hand")
     runs = [
         "sin_sin_kp24_m0.74_l0.1", "lift_and_drop_kp8_m1.17_l0.15", "lift_and_drop_kp4_m0.54_l0.15",
         "sin_time_square_kp8_m0.54_l0.15", "lift_and_drop_kp32_m0.74_l0.1", "sin_time_square_kp32_m1.17_l0.15",
