@@ -6,11 +6,13 @@ import copy
 from typing import Any
 
 import numpy as np
+import torch
 
 from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
+from simgap.neural.training.state_space import First, StateSpace
 from simgap.records import UnusableInput
 
 OPSET = 17
@@ -27,6 +29,7 @@ class _Graph:
         self.net = net
         self.nodes: list[Any] = []
         self.constants: list[Any] = []
+        self.names = 0
 
     def constant(self, value: Any) -> str:
         from onnx import numpy_helper
@@ -40,7 +43,8 @@ class _Graph:
     def add(self, operator: str, *inputs: str, **attributes: Any) -> str:
         from onnx import helper
 
-        name = f"v{len(self.nodes)}"
+        self.names += 1
+        name = f"v{self.names}"
         self.nodes.append(helper.make_node(operator, list(inputs), [name], **attributes))
         return name
 
@@ -88,6 +92,10 @@ class _Graph:
                 return self.lru(block, x)
             case Filtered():
                 return self.filtered(block, x)
+            case StateSpace():
+                return self.state_space(block, x)
+            case First():
+                return self.add("Slice", self.block(block.body, x), self.whole(0), self.whole(block.count), self.whole(2))
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
 
     def dense(self, layer: Any, x: str) -> str:
@@ -167,6 +175,51 @@ class _Graph:
             before = self.add("Pad", s, self.whole(0, 1, 0, 0, -1, -n))
             x = self.add("Add", self.add("Mul", x, self.constant(b0.astype(np.float32))), before)
         return x
+
+    def bent(self, x: str, linear: Any, inner: Any, outer: Any) -> str:
+        """Add W x + b + V tanh(U x + c) + d of the pairs (W, b), (U, c) and (V, d), in double precision."""
+
+        def affine(x: str, weight: Any, bias: Any) -> str:
+            w, b = (self.constant(value.detach().cpu().double().numpy()) for value in (weight.t(), bias))
+            return self.add("Add", self.add("MatMul", x, w), b)
+
+        return self.add("Add", affine(x, *linear), affine(self.add("Tanh", affine(x, *inner)), *outer))
+
+    def state_space(self, block: StateSpace, x: str) -> str:
+        """Scan over the samples in double precision; the state is carried, and the samples that the encoder reads."""
+        from onnx import TensorProto, helper
+
+        double, last = TensorProto.DOUBLE, self.whole(-1)
+        n, encoder, zeros = block.size, block.encoder, np.zeros(block.size)
+        inputs = block.nu if encoder is None else encoder.linear.in_features // encoder.past
+        past = 1 if encoder is None else encoder.past
+        x = self.add("Cast", x, to=double)
+        first = self.add("Squeeze", self.add("Slice", x, self.whole(0), self.whole(1), self.whole(1)), self.whole(1))
+        starts = [
+            self.add("MatMul", first, self.constant(np.zeros((inputs, size)))) for size in (n, past * inputs)
+        ]  # fmt: skip
+        around, self.nodes = self.nodes, []
+        s, rows, now = (f"{first}_{name}" for name in ("state", "rows", "now"))
+        u = self.add("Slice", now, self.whole(0), self.whole(block.nu), last)
+        new = self.add("Concat", self.add("Slice", rows, self.whole(inputs), self.whole(2**31), last), now, axis=1)
+        both, zero = self.add("Concat", s, u, axis=1), torch.from_numpy(zeros)
+        inner = block.inner.weight, block.inner.bias
+        moved = self.bent(both, (block.linear(), zero), inner, (block.weight_out, zero))
+        if encoder is not None:
+            layers = [(layer.weight, layer.bias) for layer in (encoder.inner, encoder.outer)]
+            found = self.bent(new, (encoder.weight(), encoder.linear.bias), *layers)
+            mark = self.add("Slice", now, last, self.whole(2**31), last)
+            moved = self.add("Add", moved, self.add("Mul", mark, self.add("Sub", found, moved)))
+        kept = self.add("Identity", both)
+        shapes = ((s, n), (rows, past * inputs), (now, inputs)), ((moved, n), (new, past * inputs), (kept, n + block.nu))
+        values = ([helper.make_tensor_value_info(name, double, ["B", size]) for name, size in part] for part in shapes)
+        body, self.nodes = helper.make_graph(self.nodes, f"{first}_body", *values), around
+        outputs = [f"{first}_{name}" for name in ("last_state", "last_rows", "states")]
+        self.nodes.append(
+            helper.make_node("Scan", [*starts, x], outputs, body=body, num_scan_inputs=1, scan_input_axes=[1],
+                             scan_output_axes=[1])
+        )  # fmt: skip
+        return self.add("Cast", outputs[2], to=TensorProto.FLOAT)
 
     def scaled(self, x: str, scaling: Any) -> str:
         shifted = self.add("Sub", x, self.constant(np.array(scaling.middle)))

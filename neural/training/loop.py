@@ -16,6 +16,7 @@ from simgap.neural.training.blocks import Block
 from simgap.neural.training.checkpoints import Checkpoint
 from simgap.neural.training.examples import Examples
 from simgap.neural.training.linear import Diagonal, Filters
+from simgap.neural.training.state_space import StateSpace
 
 # Windows or pieces whose error is computed at once, after an epoch, and at the end: the paper's 24,160 to train on and
 # 5,400 to validate on are all among them.
@@ -23,7 +24,7 @@ AT_ONCE = 256
 AFTER_AN_EPOCH = 6000
 AT_THE_END = 30_000
 # Weights that say how long a layer remembers: L2 would shorten that, and leaves them out.
-MEMORY = ("weight_hh", "nu", "theta", "gamma", "weight_den")
+MEMORY = ("weight_hh", "nu", "theta", "gamma", "weight_den", "radius", "angle")
 
 
 class NotANumber(ArithmeticError):
@@ -67,7 +68,7 @@ class History:
 def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
     """Make Adam with weight decay 2 l2, the gradient of l2 w^2, on input, convolution and filter weights."""
     decayed = {
-        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d | Diagonal | Filters)
+        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d | Diagonal | Filters | StateSpace)
         for name, p in m.named_parameters() if not name.startswith(MEMORY)
     }  # fmt: skip
     groups = [

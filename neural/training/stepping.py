@@ -15,6 +15,7 @@ from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
 from simgap.neural.training.scaling import features
+from simgap.neural.training.state_space import Encoder, First, StateSpace
 from simgap.records import UnusableInput
 from simgap.step_form import StepForm, source_of
 
@@ -22,7 +23,7 @@ RECURRENT: dict[type, tuple[str, int]] = {Srnn: ("rnn", 1), Gru: ("gru", 1), Lst
 LAYERS = (
     steps.sigmoid, steps.weighted, steps.dense, steps.rnn, steps.gru, steps.lstm, steps.remember, steps.convolution,
     steps.mean_of_two, steps.add, steps.copy, steps.gated, steps.squash, steps.gate, steps.diagonal, steps.read_off,
-    steps.section,
+    steps.section, steps.read, steps.hold,
 )  # fmt: skip
 STATEFUL = '''\
 def step(s: list, u: list, y: list):
@@ -123,6 +124,10 @@ class _Writer:
                 return self.lru(block, x, nx)
             case Filtered():
                 return self.filtered(block, x, nx)
+            case StateSpace():
+                return self.state_space(block, x, nx)
+            case First():
+                return self.block(block.body, x, nx)[0], block.count
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
 
     def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:
@@ -196,6 +201,37 @@ class _Writer:
             self.lines.append(f"section({x}, {nx}, s, {at}, {y}, {self.weights(num, den)})")
             x = y
         return x, nx
+
+
+    def state_space(self, block: StateSpace, x: str, nx: int) -> tuple[str, int]:
+        n, size = block.size, block.size + block.nu
+        at, y = self.take(n), self.array(size)
+        self.lines += [f"read(s, {at}, {n}, {y})", f"copy({x}, {block.nu}, {y}, {n})"]
+        linear, zeros = block.linear(), torch.zeros(n)
+        free = self.bent(y, size, (linear, zeros), block.inner, (block.weight_out, zeros))
+        self.lines.append(f"hold({free}, {n}, s, {at}, 1.0)")
+        if block.encoder is not None:
+            found = self.encoded(block.encoder, x, nx)
+            self.lines.append(f"hold({found}, {n}, s, {at}, {x}[{nx - 1}])")
+        return y, size
+
+    def encoded(self, encoder: Encoder, x: str, nx: int) -> str:
+        size = encoder.past * nx
+        at, rows = self.take(size), self.array(size)
+        self.lines += [f"remember({x}, {nx}, s, {at}, {encoder.past})", f"read(s, {at}, {size}, {rows})"]
+        linear, outer = (encoder.weight(), encoder.linear.bias), (encoder.outer.weight, encoder.outer.bias)
+        return self.bent(rows, size, linear, encoder.inner, outer)
+
+    def bent(self, x: str, nx: int, linear: Any, inner: Any, outer: Any) -> str:
+        """Write W x + b + V tanh(U x + c) + d of the weights (W, b), the layer (U, c) and the weights (V, d)."""
+        n, y = len(linear[0]), self.array(len(linear[0]))
+        hidden, size = self.dense(inner, x, nx)
+        bent = self.array(n)
+        self.lines += [
+            f"dense({x}, {nx}, {y}, {n}, {self.weights(*linear)}, 0)", f"squash({hidden}, {size})",
+            f"dense({hidden}, {size}, {bent}, {n}, {self.weights(*outer)}, 0)", f"add({y}, {bent}, {n}, {y}, 0)",
+        ]  # fmt: skip
+        return y
 
 
 def step_form(model: Any, nu: int, ny: int) -> StepForm:

@@ -113,6 +113,18 @@ def gated(x: list, nx: int, count: int, y: list):
         y[nx + i] = x[i] * x[nx - 1]
 
 
+def read(s: list, at: int, n: int, y: list):
+    """y = s[at], s[at + 1], .."""
+    for i in range(n):
+        y[i] = s[at + i]
+
+
+def hold(x: list, n: int, s: list, at: int, weight: float):
+    """Move n states from s[at] on towards x, by a weight of 0 (stay) to 1 (become x)."""
+    for i in range(n):
+        s[at + i] += weight * (x[i] - s[at + i])
+
+
 def squash(x: list, n: int):
     """x = tanh(x)."""
     for i in range(n):

@@ -1,0 +1,37 @@
+"""Deep subspace encoder: Beintema, Toth and Schoukens, L4DC 2021; Beintema, Schoukens and Toth, Automatica 156, 2023."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from simgap.neural.training.blocks import Block, Headed
+from simgap.neural.training.linear_blocks import Stacked, Static
+from simgap.neural.training.network import STATEFUL, Network
+from simgap.neural.training.state_space import StateSpace
+from simgap.registry import MODELS
+
+
+@MODELS.register("subnet")
+@dataclass
+class Subnet(Network):
+    """x(n) = psi(last `past` inputs and outputs), x(k+1) = f(x(k), u(k)), y(k) = h(x(k), u(k)), all networks.
+
+    f is linear, with poles that stay inside the unit circle, and a bounded network beside it, where the paper has a
+    network with a linear way around; the encoder sees measured samples only as far as the task gives them.
+    """
+
+    stateful: ClassVar = replace(STATEFUL, learning_rate=3e-3, patience=8, early_stop=40, batches=60)
+    free: ClassVar[int] = 300
+
+    epochs: int = 160
+    states: int = 8
+    hidden: int = 32
+    past: int = 10
+
+    def net(self, inputs: int, outputs: int) -> Block:
+        """Build an untrained network with random weights."""
+        measured = 0 if self.windowed else outputs + 1
+        body = StateSpace(inputs, measured, self.states, self.hidden, self.past)
+        features = body.size + body.nu
+        return Headed(Stacked([body, Static(features, self.hidden)]), features, outputs)
