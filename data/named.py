@@ -42,8 +42,8 @@ def _split(text: str) -> tuple[str, list[tuple[str, str]]] | None:
     return name, [PARAMETER.findall(piece)[0] for piece in pieces]
 
 
-def _numbers(name: str, pairs: Sequence[tuple[str, str]], usual: Mapping[str, float]) -> dict[str, float]:
-    numbers: dict[str, float] = {}
+def _numbers(name: str, pairs: Sequence[tuple[str, str]], usual: Mapping[str, int | float]) -> dict[str, int | float]:
+    numbers: dict[str, int | float] = {}
     for key, number in pairs:
         if key not in usual or key in numbers:
             takes = f"it takes {', '.join(usual)}, each once" if usual else "it takes none"
@@ -65,7 +65,7 @@ def parameters_of(text: str) -> tuple[str, dict[str, float]]:
     return (name, changed) if changed.keys() <= usual_parameters(name).keys() else (text, {})
 
 
-def usual_parameters(name: str) -> dict[str, float]:
+def usual_parameters(name: str) -> dict[str, int | float]:
     """List the parameters that a registered data set takes, with what they usually are."""
     parameters = inspect.signature(DATASETS[name]).parameters
     return {key: one.default for key, one in parameters.items() if isinstance(one.default, int | float)}

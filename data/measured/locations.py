@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import platformdirs
@@ -65,27 +64,32 @@ class Source:
 
 def reads(
     collection: str, *patterns: str, download: Callable[[Path], None], where: str
-) -> Callable[[Callable[[Path], Dataset]], Callable[[], Dataset]]:
-    """Turn `name(folder) -> Dataset` into `name() -> Dataset`, which finds its folder or raises Missing.
+) -> Callable[[Callable[[Path], Dataset]], Callable[..., Dataset]]:
+    """Turn `name(folder) -> Dataset` into `name(n_init=0) -> Dataset`, which finds its folder or raises Missing.
 
-    The result carries the Source as `.source` and keeps name and docstring. It never downloads.
+    n_init is the number of measured samples that start a simulation, 0 for what the set itself says. The result carries the Source as `.source` and keeps name and docstring. It never downloads.
     """
 
     def tie(build: Callable[[Path], Dataset]) -> Callable[[], Dataset]:
         source = Source(build.__name__, collection, patterns, download, where, build)
 
-        def load_files() -> Dataset:
+        def load_files(n_init: int = 0) -> Dataset:
             folder = source.folder()
             if folder is None:
                 raise Missing(source.why_missing())
-            return source.read(folder)
+            dataset = source.read(folder)
+            return _started(dataset, n_init) if n_init else dataset
 
-        functools.update_wrapper(load_files, build)
-        del load_files.__wrapped__  # type: ignore[attr-defined]  # the signature is the one without the folder
+        for name in ("__module__", "__name__", "__qualname__", "__doc__"):  # the signature stays that of load_files
+            setattr(load_files, name, getattr(build, name))
         load_files.source = source  # type: ignore[attr-defined]
         return load_files
 
     return tie
+
+
+def _started(dataset: Dataset, n_init: int) -> Dataset:
+    return replace(dataset, training=replace(dataset.training, n_init=n_init), n_init=n_init)
 
 
 def roots() -> list[Path]:

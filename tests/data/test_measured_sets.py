@@ -261,3 +261,10 @@ def test_listing_what_is_available_reads_no_file(made, monkeypatch):
     assert available()["emps"] == ""
     assert available()["f16"] == ""
     assert "fetch ced" in available()["ced"]
+
+
+def test_a_measured_set_may_start_from_fewer_samples_as_older_publications_did(measured):
+    usual, early = load("ced"), load("ced-n_init4")
+    assert early.name == "ced-n_init4"
+    assert (usual.n_init, early.n_init, early.training.n_init) == (10, 4, 4)
+    assert all(np.array_equal(a.y, b.y) for a, b in zip(usual.test, early.test, strict=True))

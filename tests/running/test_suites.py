@@ -161,5 +161,5 @@ def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones():
-    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are benchmark, crossover, full, paper, smoke"):
+    with pytest.raises(UnusableInput, match="no suite 'nosuch'; known are benchmark, crossover, full, paper, records, smoke"):
         load_suite("nosuch")
