@@ -80,6 +80,7 @@ def candidate(reference: str, params: dict[str, Any] | None = None) -> Candidate
     """The model called `reference` (see `simgap.fit`), a network trained for a second. Raises UnusableInput."""
     kind = model_class(reference)
     usual = {"epochs": 6, "batches": 20} if hasattr(kind, "epochs") and hasattr(kind, "batches") else {}
+    usual |= {"seeds": 1} if hasattr(kind, "seeds") else {}
     given = usual | (params or {})
     check_params(reference, given)
     return Candidate(reference, lambda: kind(**given))

@@ -1,0 +1,91 @@
+"""The weighted mean of several simulations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from simgap.protocol import is_stochastic
+from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.registry import MODELS
+
+
+@MODELS.register("ensemble")
+@dataclass
+class Ensemble:
+    """Several models, and of each that depends on its seed several fits: the mean of their simulations.
+
+    y_hat = sum_i w_i y_hat_i, w_i ~ 1 / mse_i, sum_i w_i = 1, with the mean squared error of each free run over the
+    validation data (Bates and Granger 1969). Errors that members do not share cancel. models: their names; seeds: fits
+    of each; epochs, batches: of the networks among them, 0 for what they do alone. Raises UnusableInput.
+    """
+
+    models: Sequence[str] = ("lstm", "encoder")
+    seeds: int = 5
+    epochs: int = 0
+    batches: int = 0
+    members: list[Any] = field(init=False, repr=False)
+    weights: Float[np.ndarray, " M"] = field(init=False, repr=False)
+
+    def fit(self, data: TrainingSet, seed: int) -> None:
+        """Fit the members with seeds of their own, and weigh them."""
+        if not self.models or self.seeds < 1:
+            raise UnusableInput("an ensemble needs at least one model and one seed")
+        self.members = []
+        for name in self.models:
+            for number in range(self.seeds):
+                member = MODELS[name](**self._params(name))
+                member.fit(data, self.seeds * seed + number)
+                self.members.append(member)
+                if not is_stochastic(member):
+                    break
+        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        scale = np.concatenate([x.y for x in held_out]).std(axis=0)
+        errors = np.array([_squared_error(member, held_out, data.n_init, scale) for member in self.members])
+        if not np.isfinite(errors).any():
+            raise UnusableInput("no member of the ensemble simulates the validation data")
+        worth = 1 / np.maximum(np.where(np.isfinite(errors), errors, np.inf), 1e-30)
+        self.weights = worth / worth.sum()
+
+    def simulate(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
+    ) -> Float[np.ndarray, "B T-n ny"]:
+        """Simulate with each member that has a weight, and take the mean."""
+        used = [(w, member) for w, member in zip(self.weights, self.members, strict=True) if w > 0]
+        return np.sum([w * member.simulate(u, y_init) for w, member in used], axis=0)
+
+    def _params(self, name: str) -> dict[str, int]:
+        given = {"epochs": self.epochs, "batches": self.batches}
+        return {key: value for key, value in given.items() if value and hasattr(MODELS[name], key)}
+
+    @property
+    def stochastic(self) -> bool:
+        """Whether a member is."""
+        return any(map(is_stochastic, self.members))
+
+    @property
+    def n_params(self) -> int:
+        """Those of all members."""
+        return sum(int(getattr(member, "n_params", 0) or 0) for member in self.members)
+
+    @property
+    def fitted(self) -> dict[str, Any]:
+        """The weight of each member, in the order of their fits."""
+        return {"weights": self.weights.tolist()}
+
+
+def _squared_error(
+    member: Any, experiments: Sequence[Experiment], n: int, scale: Float[np.ndarray, " ny"]
+) -> float:  # fmt: skip
+    """The mean squared error of free runs, each output over its spread; infinite where a run has no end."""
+    errors = []
+    for x in experiments:
+        with np.errstate(all="ignore"):
+            y_hat = member.simulate(x.u[None], x.y[None, :n])[0]
+            errors.append(((y_hat - x.y[n:]) / np.where(scale > 0, scale, 1.0)) ** 2)
+    mse = float(np.mean(np.concatenate(errors)))
+    return mse if np.isfinite(mse) else np.inf
