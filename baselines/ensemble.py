@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -17,15 +17,17 @@ from simgap.registry import MODELS
 @MODELS.register("ensemble")
 @dataclass
 class Ensemble:
-    """Several models, and of each that depends on its seed several fits: the mean of their simulations.
+    """The mean of the simulations of several models; one that is named twice is fitted twice, with other seeds.
 
     y_hat = sum_i w_i y_hat_i, w_i ~ 1 / mse_i, sum_i w_i = 1, with the mean squared error of each free run over the
-    validation data (Bates and Granger 1969). Errors that members do not share cancel. models: their names; seeds: fits
-    of each; epochs, batches: of the networks among them, 0 for what they do alone. Raises UnusableInput.
+    validation data (Bates and Granger 1969). Errors that members do not share cancel: those of physics and of networks,
+    those of two starts of one network. epochs, batches: of the networks among them, 0 for what they do alone. Raises
+    UnusableInput.
     """
 
-    models: Sequence[str] = ("lstm", "encoder")
-    seeds: int = 5
+    quick: ClassVar = {"models": ("arx", "gru"), "epochs": 6, "batches": 20}
+
+    models: Sequence[str] = ("hybrid", *5 * ("lstm",), *5 * ("encoder",))
     epochs: int = 0
     batches: int = 0
     members: list[Any] = field(init=False, repr=False)
@@ -33,16 +35,11 @@ class Ensemble:
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Fit the members with seeds of their own, and weigh them."""
-        if not self.models or self.seeds < 1:
-            raise UnusableInput("an ensemble needs at least one model and one seed")
-        self.members = []
-        for name in self.models:
-            for number in range(self.seeds):
-                member = MODELS[name](**self._params(name))
-                member.fit(data, self.seeds * seed + number)
-                self.members.append(member)
-                if not is_stochastic(member):
-                    break
+        if not self.models:
+            raise UnusableInput("an ensemble needs at least one model")
+        self.members = [MODELS[name](**self._params(name)) for name in self.models]
+        for number, member in enumerate(self.members):
+            member.fit(data, len(self.members) * seed + number)
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
         scale = np.concatenate([x.y for x in held_out]).std(axis=0)
         errors = np.array([_squared_error(member, held_out, data.n_init, scale) for member in self.members])

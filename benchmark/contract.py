@@ -77,11 +77,13 @@ class Candidate:
 
 
 def candidate(reference: str, params: dict[str, Any] | None = None) -> Candidate:
-    """The model called `reference` (see `simgap.fit`), a network trained for a second. Raises UnusableInput."""
+    """The model called `reference` (see `simgap.fit`), a network trained for a second. Raises UnusableInput.
+
+    A model of many parts may say in `quick` with which parameters a trial is short.
+    """
     kind = model_class(reference)
-    usual = {"epochs": 6, "batches": 20} if hasattr(kind, "epochs") and hasattr(kind, "batches") else {}
-    usual |= {"seeds": 1} if hasattr(kind, "seeds") else {}
-    given = usual | (params or {})
+    network = {"epochs": 6, "batches": 20} if hasattr(kind, "epochs") and hasattr(kind, "batches") else {}
+    given = getattr(kind, "quick", network) | (params or {})
     check_params(reference, given)
     return Candidate(reference, lambda: kind(**given))
 
