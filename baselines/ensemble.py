@@ -21,15 +21,15 @@ class Ensemble:
 
     y_hat = sum_i w_i y_hat_i, w_i ~ 1 / mse_i, sum_i w_i = 1, with the mean squared error of each free run over the
     validation data (Bates and Granger 1969). Errors that members do not share cancel: those of physics and of networks,
-    those of two starts of one network. epochs, batches: of the networks among them, 0 for what they do alone. Raises
-    UnusableInput.
+    those of two starts of one network. epochs, batches: of the networks among them, shorter than alone, as they are
+    many; 0 for what they do alone. Raises UnusableInput.
     """
 
     quick: ClassVar = {"models": ("arx", "gru"), "epochs": 6, "batches": 20}
 
     models: Sequence[str] = ("hybrid", *5 * ("lstm",), *5 * ("encoder",))
-    epochs: int = 0
-    batches: int = 0
+    epochs: int = 30
+    batches: int = 40
     members: list[Any] = field(init=False, repr=False)
     weights: Float[np.ndarray, " M"] = field(init=False, repr=False)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from simgap.neural.training.blocks import Block
-from simgap.neural.training.network import STATEFUL, Network
+from simgap.neural.training.network import LONG, Network
 from simgap.neural.training.state_space import First, StateSpace
 from simgap.registry import MODELS
 
@@ -20,10 +20,9 @@ class NeuralOde(Network):
     return (Beintema et al. 2023 for the encoder that finds x).
     """
 
-    stateful: ClassVar = replace(STATEFUL, learning_rate=3e-3, patience=8, early_stop=40, batches=60)
+    stateful: ClassVar = replace(LONG, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
     free: ClassVar[int] = 300
 
-    epochs: int = 160
     states: int = 8
     hidden: int = 32
     past: int = 10

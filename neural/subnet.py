@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed
 from simgap.neural.training.linear_blocks import Stacked, Static
-from simgap.neural.training.network import STATEFUL, Network
+from simgap.neural.training.network import LONG, Network
 from simgap.neural.training.state_space import StateSpace
 from simgap.registry import MODELS
 
@@ -18,13 +18,13 @@ class Subnet(Network):
     """x(n) = psi(last `past` inputs and outputs), x(k+1) = f(x(k), u(k)), y(k) = h(x(k), u(k)), all networks.
 
     f is linear, with poles that stay inside the unit circle, and a bounded network beside it, where the paper has a
-    network with a linear way around; the encoder sees measured samples only as far as the task gives them.
+    network with a linear way around; the encoder sees measured samples only as far as the task gives them. How long it
+    trains was chosen on the validation part of the Silverbox: 0.51 mV after 160 epochs, 0.25 after 700.
     """
 
-    stateful: ClassVar = replace(STATEFUL, learning_rate=3e-3, patience=8, early_stop=40, batches=60)
+    stateful: ClassVar = replace(LONG, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
     free: ClassVar[int] = 300
 
-    epochs: int = 160
     states: int = 8
     hidden: int = 32
     past: int = 10

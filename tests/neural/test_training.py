@@ -138,7 +138,7 @@ def test_the_learning_rate_range_test_ends_where_the_loss_explodes(data):
     [
         ({"mode": "sideways"}, "the mode 'sideways' is not known"),
         ({"device": "cuda:77"}, "the device 'cuda:77' cannot be used"),
-        ({"epochs": 0}, "at least one epoch"),
+        ({"epochs": -1}, "no number of epochs below zero"),
         ({"window": 500}, "longer than the window of 500 samples"),
     ],
 )
