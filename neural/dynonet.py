@@ -19,11 +19,13 @@ class DynoNet(Network):
     """FC(channels) - G - F - G - FC(ny): transfer functions G of order 2 `sections`, a static network F between.
 
     The paper's matrix of transfer functions is here one for each channel, between fully connected layers. Stateful, it
-    has a recipe of its own and longer pieces, as chosen on the validation parts of Wiener-Hammerstein, Silverbox and the
-    tanks.
+    has a recipe of its own and longer pieces, as chosen on the validation parts of Wiener-Hammerstein, Silverbox and
+    the tanks.
     """
 
-    stateful: ClassVar = replace(STATEFUL, epochs=160, learning_rate=1e-2, patience=8, early_stop=40, batches=60)
+    stateful: ClassVar = replace(
+        STATEFUL, epochs=160, learning_rate=1e-2, patience=8, early_stop=40, batches=60
+    )  # fmt: skip
     free: ClassVar[int] = 300
 
     channels: int = 8

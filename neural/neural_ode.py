@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.network import LONG, Network
-from simgap.neural.training.state_space import First, StateSpace
+from simgap.neural.training.state_space import StateSpace
 from simgap.registry import MODELS
 
 
@@ -23,11 +23,11 @@ class NeuralOde(Network):
     stateful: ClassVar = replace(LONG, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
     free: ClassVar[int] = 300
 
-    states: int = 8
+    pairs: int = 4
     hidden: int = 32
     past: int = 10
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
         measured = 0 if self.windowed else outputs + 1
-        return First(StateSpace(inputs, measured, self.states, self.hidden, self.past, outputs), outputs)
+        return StateSpace(inputs, measured, self.pairs, self.hidden, self.past, outputs)

@@ -1,4 +1,4 @@
-"""Deep subspace encoder: Beintema, Toth and Schoukens, L4DC 2021; Beintema, Schoukens and Toth, Automatica 156, 2023."""
+"""Deep subspace encoder: Beintema, Toth, Schoukens, L4DC 2021; Beintema, Schoukens, Toth, Automatica 156, 2023."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Subnet(Network):
     stateful: ClassVar = replace(LONG, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
     free: ClassVar[int] = 300
 
-    states: int = 8
+    pairs: int = 4
     hidden: int = 32
     past: int = 10
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
         measured = 0 if self.windowed else outputs + 1
-        body = StateSpace(inputs, measured, self.states, self.hidden, self.past)
+        body = StateSpace(inputs, measured, self.pairs, self.hidden, self.past)
         features = body.size + body.nu
         return Headed(Stacked([body, Static(features, self.hidden)]), features, outputs)

@@ -67,10 +67,11 @@ def reads(
 ) -> Callable[[Callable[[Path], Dataset]], Callable[..., Dataset]]:
     """Turn `name(folder) -> Dataset` into `name(n_init=0) -> Dataset`, which finds its folder or raises Missing.
 
-    n_init is the number of measured samples that start a simulation, 0 for what the set itself says. The result carries the Source as `.source` and keeps name and docstring. It never downloads.
+    n_init is the number of measured samples that start a simulation, 0 for what the set itself says. The result carries
+    the Source as `.source` and keeps name and docstring. It never downloads.
     """
 
-    def tie(build: Callable[[Path], Dataset]) -> Callable[[], Dataset]:
+    def tie(build: Callable[[Path], Dataset]) -> Callable[..., Dataset]:
         source = Source(build.__name__, collection, patterns, download, where, build)
 
         def load_files(n_init: int = 0) -> Dataset:

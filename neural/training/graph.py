@@ -12,7 +12,7 @@ from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences,
 from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
-from simgap.neural.training.state_space import First, StateSpace
+from simgap.neural.training.state_space import StateSpace
 from simgap.records import UnusableInput
 
 OPSET = 17
@@ -94,8 +94,6 @@ class _Graph:
                 return self.filtered(block, x)
             case StateSpace():
                 return self.state_space(block, x)
-            case First():
-                return self.add("Slice", self.block(block.body, x), self.whole(0), self.whole(block.count), self.whole(2))
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
 
     def dense(self, layer: Any, x: str) -> str:
@@ -211,7 +209,10 @@ class _Graph:
             mark = self.add("Slice", now, last, self.whole(2**31), last)
             moved = self.add("Add", moved, self.add("Mul", mark, self.add("Sub", found, moved)))
         kept = self.add("Identity", both)
-        shapes = ((s, n), (rows, past * inputs), (now, inputs)), ((moved, n), (new, past * inputs), (kept, n + block.nu))
+        shapes = (
+            ((s, n), (rows, past * inputs), (now, inputs)),
+            ((moved, n), (new, past * inputs), (kept, n + block.nu)),
+        )
         values = ([helper.make_tensor_value_info(name, double, ["B", size]) for name, size in part] for part in shapes)
         body, self.nodes = helper.make_graph(self.nodes, f"{first}_body", *values), around
         outputs = [f"{first}_{name}" for name in ("last_state", "last_rows", "states")]
@@ -219,7 +220,9 @@ class _Graph:
             helper.make_node("Scan", [*starts, x], outputs, body=body, num_scan_inputs=1, scan_input_axes=[1],
                              scan_output_axes=[1])
         )  # fmt: skip
-        return self.add("Cast", outputs[2], to=TensorProto.FLOAT)
+        features = self.add("Cast", outputs[2], to=TensorProto.FLOAT)
+        shown = block.integrated or n + block.nu
+        return self.add("Slice", features, self.whole(0), self.whole(shown), self.whole(2))
 
     def scaled(self, x: str, scaling: Any) -> str:
         shifted = self.add("Sub", x, self.constant(np.array(scaling.middle)))

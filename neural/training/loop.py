@@ -23,7 +23,8 @@ from simgap.neural.training.state_space import StateSpace
 AT_ONCE = 256
 AFTER_AN_EPOCH = 6000
 AT_THE_END = 30_000
-# Weights that say how long a layer remembers: L2 would shorten that, and leaves them out.
+# Layers whose weights L2 keeps small, but those that say how long a layer remembers, which it would shorten.
+DECAYED = nn.RNNBase | nn.Conv1d | Diagonal | Filters | StateSpace
 MEMORY = ("weight_hh", "nu", "theta", "gamma", "weight_den", "radius", "angle")
 
 
@@ -68,7 +69,7 @@ class History:
 def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
     """Make Adam with weight decay 2 l2, the gradient of l2 w^2, on input, convolution and filter weights."""
     decayed = {
-        id(p) for m in net.modules() if recipe.l2 and isinstance(m, nn.RNNBase | nn.Conv1d | Diagonal | Filters | StateSpace)
+        id(p) for m in net.modules() if recipe.l2 and isinstance(m, DECAYED)
         for name, p in m.named_parameters() if not name.startswith(MEMORY)
     }  # fmt: skip
     groups = [

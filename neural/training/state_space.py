@@ -83,18 +83,15 @@ class Encoder(nn.Module):
 class StateSpace(Block):
     """s(k+1) = A s(k) + B u(k) + V tanh(W s(k) + U u(k) + c); the features of sample k are [s(k), u(k)].
 
-    A turns and shrinks pairs of states, as the poles of an LRU do, and tanh is bounded: no weights make a state run
+    A turns and shrinks `pairs` of states, as the poles of an LRU do, and tanh is bounded: no weights make these run
     away. The last `measured` features of a sample, outputs and the mark of a measured one, are no inputs u. Behind
-    samples with the mark 1 the state is what an encoder says; without any it begins at zero. With `integrated` the
-    first so many states are the outputs, summed up from the others: the first rows of A are [I, L].
+    samples with the mark 1 the state is what an encoder says; without any it begins at zero. So many states as are
+    `integrated` come first and are the only features: the outputs, summed up from the others by rows [I, L] of A.
     """
 
-    def __init__(
-        self, inputs: int, measured: int, states: int, hidden: int, past: int, integrated: int = 0
-    ) -> None:
+    def __init__(self, inputs: int, measured: int, pairs: int, hidden: int, past: int, integrated: int = 0) -> None:
         super().__init__()
         self.nu, self.integrated = inputs - measured, integrated
-        pairs = states // 2
         self.size = integrated + 2 * pairs
         low, high = RADII
         radius = torch.sqrt(torch.rand(pairs) * (high**2 - low**2) + low**2)
@@ -118,17 +115,17 @@ class StateSpace(Block):
         return torch.cat((torch.cat((outputs, others)), self.weight_in), 1)
 
     def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Compute [s(k), u(k)] at all samples."""
+        """Compute the features at all samples."""
         measured = int(x[0, :, -1].sum()) if self.encoder is not None else 0
         s = x.new_zeros(len(x), 1, self.size)
         if self.encoder is not None and measured:
             s = torch.cat((s, self.encoder(x[:, :measured])), 1)
         u = x[..., : self.nu]
         s = torch.cat((s[:, :-1], self._free(u[:, measured:-1], s[:, -1])), 1)
-        return torch.cat((s, u), dim=2)
+        return s[..., : self.integrated] if self.integrated else torch.cat((s, u), dim=2)
 
     def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Compute [s(k), u(k)] at the last sample."""
+        """Compute the features at the last sample."""
         return self.forward(x)[:, -1]
 
     def _free(self, u: Float[Tensor, "B T nu"], start: Float[Tensor, "B S"]) -> Float[Tensor, "B N S"]:
@@ -138,19 +135,3 @@ class StateSpace(Block):
         run = _Pass.apply if u.device.type == "cpu" else sample_by_sample
         s: Tensor = run(a, w, self.weight_out, linear.permute(1, 2, 0), bent.permute(1, 2, 0), start.t())
         return s.permute(2, 0, 1)
-
-
-class First(Block):
-    """The first features of a block: the outputs of one that is `integrated`."""
-
-    def __init__(self, body: Block, count: int) -> None:
-        super().__init__()
-        self.body, self.count = body, count
-
-    def forward(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B T G"]:
-        """Compute them at all samples."""
-        return self.body(x)[..., : self.count]
-
-    def last(self, x: Float[Tensor, "B T F"]) -> Float[Tensor, "B G"]:
-        """Compute them at the last sample."""
-        return self.body.last(x)[..., : self.count]

@@ -15,7 +15,7 @@ from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn
 from simgap.neural.training.scaling import features
-from simgap.neural.training.state_space import Encoder, First, StateSpace
+from simgap.neural.training.state_space import Encoder, StateSpace
 from simgap.records import UnusableInput
 from simgap.step_form import StepForm, source_of
 
@@ -126,8 +126,6 @@ class _Writer:
                 return self.filtered(block, x, nx)
             case StateSpace():
                 return self.state_space(block, x, nx)
-            case First():
-                return self.block(block.body, x, nx)[0], block.count
         raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
 
     def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:
@@ -202,7 +200,6 @@ class _Writer:
             x = y
         return x, nx
 
-
     def state_space(self, block: StateSpace, x: str, nx: int) -> tuple[str, int]:
         n, size = block.size, block.size + block.nu
         at, y = self.take(n), self.array(size)
@@ -213,7 +210,7 @@ class _Writer:
         if block.encoder is not None:
             found = self.encoded(block.encoder, x, nx)
             self.lines.append(f"hold({found}, {n}, s, {at}, {x}[{nx - 1}])")
-        return y, size
+        return y, block.integrated or size
 
     def encoded(self, encoder: Encoder, x: str, nx: int) -> str:
         size = encoder.past * nx

@@ -5,7 +5,7 @@ import torch
 
 from simgap.neural.training.loop import Recipe, optimiser
 from simgap.neural.training.sequences import with_start
-from simgap.neural.training.state_space import First, StateSpace, _Pass, sample_by_sample
+from simgap.neural.training.state_space import StateSpace, _Pass, sample_by_sample
 
 NU, NY = 2, 1
 
@@ -16,7 +16,7 @@ def drawn(*shape):
 
 def block(measured=NY + 1, integrated=0, past=4):
     torch.manual_seed(0)
-    return StateSpace(NU + measured, measured, 6, 5, past, integrated).double()
+    return StateSpace(NU + measured, measured, 3, 5, past, integrated).double()
 
 
 def record(n, length=30):
@@ -30,8 +30,9 @@ def test_the_gradients_of_its_pass_are_those_of_finite_differences():
 
 
 def test_off_the_cpu_it_gives_the_same_states_and_gradients():
-    arrays = [x.requires_grad_() for x in (drawn(3, 3) / 3, drawn(4, 3), drawn(3, 4) / 3, drawn(9, 3, 2), drawn(9, 4, 2))]
-    start, weights = drawn(3, 2).requires_grad_(), drawn(10, 3, 2)
+    drawings = drawn(3, 3) / 3, drawn(4, 3), drawn(3, 4) / 3, drawn(9, 3, 2), drawn(9, 4, 2), drawn(3, 2)
+    *arrays, start = (x.requires_grad_() for x in drawings)
+    weights = drawn(10, 3, 2)
     both = [run(*arrays, start) for run in (_Pass.apply, sample_by_sample)]
     torch.testing.assert_close(*both, atol=1e-5, rtol=1e-5)
     gradients = [torch.autograd.grad((s * weights).sum(), (*arrays, start)) for s in both]
@@ -71,7 +72,7 @@ def test_integrated_outputs_begin_at_the_last_measured_ones():
     layer, x = block(integrated=NY), record(5)
     for weights in (layer.encoder.linear, layer.encoder.outer):
         torch.nn.init.zeros_(weights.weight)
-    torch.testing.assert_close(First(layer, NY)(x)[:, 5], x[:, 4, NU : NU + NY])
+    torch.testing.assert_close(layer(x)[:, 5], x[:, 4, NU : NU + NY])
 
 
 @pytest.mark.parametrize("spread", [0.1, 1.0, 10.0])
