@@ -188,19 +188,17 @@ class _Graph:
         from onnx import TensorProto, helper
 
         double, last = TensorProto.DOUBLE, self.whole(-1)
-        n, encoder, zeros = block.size, block.encoder, np.zeros(block.size)
+        n, encoder, zero = block.size, block.encoder, torch.zeros(block.size)
         inputs = block.nu if encoder is None else encoder.linear.in_features // encoder.past
         past = 1 if encoder is None else encoder.past
         x = self.add("Cast", x, to=double)
         first = self.add("Squeeze", self.add("Slice", x, self.whole(0), self.whole(1), self.whole(1)), self.whole(1))
-        starts = [
-            self.add("MatMul", first, self.constant(np.zeros((inputs, size)))) for size in (n, past * inputs)
-        ]  # fmt: skip
+        starts = [self.add("MatMul", first, self.constant(np.zeros((inputs, size)))) for size in (n, past * inputs)]
         around, self.nodes = self.nodes, []
         s, rows, now = (f"{first}_{name}" for name in ("state", "rows", "now"))
         u = self.add("Slice", now, self.whole(0), self.whole(block.nu), last)
         new = self.add("Concat", self.add("Slice", rows, self.whole(inputs), self.whole(2**31), last), now, axis=1)
-        both, zero = self.add("Concat", s, u, axis=1), torch.from_numpy(zeros)
+        both = self.add("Concat", s, u, axis=1)
         inner = block.inner.weight, block.inner.bias
         moved = self.bent(both, (block.linear(), zero), inner, (block.weight_out, zero))
         if encoder is not None:
@@ -208,13 +206,13 @@ class _Graph:
             found = self.bent(new, (encoder.weight(), encoder.linear.bias), *layers)
             mark = self.add("Slice", now, last, self.whole(2**31), last)
             moved = self.add("Add", moved, self.add("Mul", mark, self.add("Sub", found, moved)))
-        kept = self.add("Identity", both)
-        shapes = (
-            ((s, n), (rows, past * inputs), (now, inputs)),
-            ((moved, n), (new, past * inputs), (kept, n + block.nu)),
-        )
-        values = ([helper.make_tensor_value_info(name, double, ["B", size]) for name, size in part] for part in shapes)
-        body, self.nodes = helper.make_graph(self.nodes, f"{first}_body", *values), around
+        taken = [(s, n), (rows, past * inputs), (now, inputs)]
+        given = [(moved, n), (new, past * inputs), (self.add("Identity", both), n + block.nu)]
+        described = [
+            [helper.make_tensor_value_info(name, double, ["B", size]) for name, size in part] for part in (taken, given)
+        ]
+        body = helper.make_graph(self.nodes, f"{first}_body", described[0], described[1])
+        self.nodes = around
         outputs = [f"{first}_{name}" for name in ("last_state", "last_rows", "states")]
         self.nodes.append(
             helper.make_node("Scan", [*starts, x], outputs, body=body, num_scan_inputs=1, scan_input_axes=[1],
