@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from simgap.baselines.estimation.linear import free_run_errors
 from simgap.protocol import is_stochastic
-from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
 
@@ -41,11 +42,10 @@ class Ensemble:
         for number, member in enumerate(self.members):
             member.fit(data, len(self.members) * seed + number)
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
-        scale = np.concatenate([x.y for x in held_out]).std(axis=0)
-        errors = np.array([_squared_error(member, held_out, data.n_init, scale) for member in self.members])
+        errors = np.array([free_run_errors(one, held_out, data.n_init, 1).mean() for one in self.members])
         if not np.isfinite(errors).any():
             raise UnusableInput("no member of the ensemble simulates the validation data")
-        worth = 1 / np.maximum(np.where(np.isfinite(errors), errors, np.inf), 1e-30)
+        worth = 1 / np.maximum(errors, 1e-30)
         self.weights = worth / worth.sum()
 
     def simulate(
@@ -73,16 +73,3 @@ class Ensemble:
     def fitted(self) -> dict[str, Any]:
         """The weight of each member, in the order of their fits."""
         return {"weights": self.weights.tolist()}
-
-
-def _squared_error(
-    member: Any, experiments: Sequence[Experiment], n: int, scale: Float[np.ndarray, " ny"]
-) -> float:  # fmt: skip
-    """The mean squared error of free runs, each output over its spread; infinite where a run has no end."""
-    errors = []
-    for x in experiments:
-        with np.errstate(all="ignore"):
-            y_hat = member.simulate(x.u[None], x.y[None, :n])[0]
-            errors.append(((y_hat - x.y[n:]) / np.where(scale > 0, scale, 1.0)) ** 2)
-    mse = float(np.mean(np.concatenate(errors)))
-    return mse if np.isfinite(mse) else np.inf

@@ -31,7 +31,11 @@ class Subnet(Network):
 
     def net(self, inputs: int, outputs: int) -> Block:
         """Build an untrained network with random weights."""
-        measured = 0 if self.windowed else outputs + 1
-        body = StateSpace(inputs, measured, self.pairs, self.hidden, self.past)
+        body = self.state_space(inputs, outputs)
         features = body.size + body.nu
         return Headed(Stacked([body, Static(features, self.hidden)]), features, outputs)
+
+    def state_space(self, inputs: int, outputs: int, integrated: int = 0) -> StateSpace:
+        """Build the encoder and the map of the states."""
+        measured = 0 if self.windowed else outputs + 1
+        return StateSpace(inputs, measured, self.pairs, self.hidden, self.past, integrated)

@@ -206,7 +206,7 @@ class _Writer:
         self.lines += [f"read(s, {at}, {n}, {y})", f"copy({x}, {block.nu}, {y}, {n})"]
         linear, zeros = block.linear(), torch.zeros(n)
         free = self.bent(y, size, (linear, zeros), block.inner, (block.weight_out, zeros))
-        self.lines.append(f"hold({free}, {n}, s, {at}, 1.0)")
+        self.lines.append(f"copy({free}, {n}, s, {at})")
         if block.encoder is not None:
             found = self.encoded(block.encoder, x, nx)
             self.lines.append(f"hold({found}, {n}, s, {at}, {x}[{nx - 1}])")
