@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.protocol import is_stochastic
+from simgap.protocol import as_chosen, is_stochastic
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -46,6 +46,12 @@ class Delta:
         else:
             differences = self.inner.simulate(u[:, 1:], np.diff(y_init, axis=1))
         return y_init[:, -1:] + np.cumsum(differences, axis=1)
+
+    def as_chosen(self) -> Delta:
+        """Sum up the differences of the other model as validation data chose it."""
+        chosen = Delta(self.model, self.params)
+        chosen.inner = as_chosen(self.inner)
+        return chosen
 
     @property
     def stochastic(self) -> bool:

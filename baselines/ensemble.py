@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -9,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.estimation.linear import free_run_errors
-from simgap.protocol import is_stochastic
+from simgap.metrics import free_run_nrmse
+from simgap.protocol import as_chosen, is_stochastic
 from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -21,9 +22,9 @@ class Ensemble:
     """The mean of the simulations of several models; one that is named twice is fitted twice, with other seeds.
 
     y_hat = sum_i w_i y_hat_i, w_i ~ 1 / mse_i, sum_i w_i = 1, with the mean squared error of each free run over the
-    validation data (Bates and Granger 1969). Errors that members do not share cancel: those of physics and of networks,
-    those of two starts of one network. epochs, batches: of the networks among them, shorter than alone, as they are
-    many; 0 for what they do alone. Raises UnusableInput.
+    validation data before these are estimated on (Bates and Granger 1969). Errors that members do not share cancel:
+    those of physics and of networks, those of two starts of one network. epochs, batches: of the networks among them,
+    shorter than alone, as they are many; 0 for what they do alone. Raises UnusableInput.
     """
 
     quick: ClassVar = {"models": ("arx", "gru"), "epochs": 6, "batches": 20}
@@ -42,11 +43,13 @@ class Ensemble:
         for number, member in enumerate(self.members):
             member.fit(data, len(self.members) * seed + number)
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
-        errors = np.array([free_run_errors(one, held_out, data.n_init, 1).mean() for one in self.members])
+        self._chosen = copy.copy(self)
+        self._chosen.members = [as_chosen(member) for member in self.members]
+        errors = np.array([free_run_nrmse(one.simulate, held_out, data.n_init) ** 2 for one in self._chosen.members])
         if not np.isfinite(errors).any():
             raise UnusableInput("no member of the ensemble simulates the validation data")
         worth = 1 / np.maximum(errors, 1e-30)
-        self.weights = worth / worth.sum()
+        self.weights = self._chosen.weights = worth / worth.sum()
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -54,6 +57,10 @@ class Ensemble:
         """Simulate with each member that has a weight, and take the mean."""
         used = [(w, member) for w, member in zip(self.weights, self.members, strict=True) if w > 0]
         return np.sum([w * member.simulate(u, y_init) for w, member in used], axis=0)
+
+    def as_chosen(self) -> Ensemble:
+        """Return the mean of the members as validation data chose them."""
+        return self._chosen
 
     def _params(self, name: str) -> dict[str, int]:
         given = {"epochs": self.epochs, "batches": self.batches}

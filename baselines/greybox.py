@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from simgap.greybox.additions import add, from_other_poles
+from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect, InputEffect
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
@@ -31,7 +34,7 @@ class GreyBox(GreyBoxModel):
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Fit the plain model, then add the effects one by one in the given order; nothing here is random."""
-        self.plants = []
+        chosen: list[tuple[Estimate, Baseline]] = []
         named = [self.effects] if isinstance(self.effects, str) else self.effects
         placed = [_place(name, data) for name in named]
         for outputs in plants_of(data.channels):
@@ -43,7 +46,15 @@ class GreyBox(GreyBoxModel):
                 if effect.simulated and (plant is None or plant == outputs):
                     larger = add(baseline, estimate, Term(effect, channel))
                     estimate = from_other_poles(baseline, estimate, larger)
-            self.plants.append(FittedPlant.fit(estimate, baseline, data.train + data.valid))
+            chosen.append((estimate, baseline))
+        self._chosen, self._train = tuple(chosen), data.train
+        self.plants = [FittedPlant.fit(*found, data.train + data.valid) for found in chosen]
+
+    def as_chosen(self) -> GreyBox:
+        """Return the same plants and effects, fitted to the training data alone."""
+        alone = copy.copy(self)
+        alone.plants = [FittedPlant.fit(*found, self._train) for found in self._chosen]
+        return alone
 
 
 def _place(name: str, data: TrainingSet) -> tuple[Effect, tuple[int, ...] | None, int]:

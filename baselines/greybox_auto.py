@@ -23,4 +23,7 @@ class GreyBoxAuto(GreyBox):
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Select effects on excerpts of the training data, then fit them to all of it; nothing here is random."""
-        self.plants = [identified.plant for identified in identify(data)]
+        found = identify(data)
+        self.plants = [identified.plant for identified in found]
+        self._chosen = tuple(identified.chosen for identified in found)
+        self._train = data.train

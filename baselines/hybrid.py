@@ -10,9 +10,10 @@ from jaxtyping import Float
 
 from simgap.baselines.estimation import filter_network
 from simgap.baselines.estimation.filter_network import FilterNetwork
+from simgap.baselines.greybox import GreyBox
 from simgap.baselines.greybox_auto import GreyBoxAuto
 from simgap.greybox.model import GreyBoxModel
-from simgap.greybox.rest import MATTERS, Rest, RestOfOutput, learn, simulated
+from simgap.greybox.rest import MATTERS, Rest, RestOfOutput, estimated_again, learn, simulated
 from simgap.greybox.rest_features import Design, Features
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
@@ -34,7 +35,7 @@ class Hybrid:
     stochastic: ClassVar[bool] = True
     parts: ClassVar = (Design, Features, FilterNetwork, Rest, RestOfOutput)  # records in a saved model
 
-    grey: GreyBoxAuto = field(init=False, repr=False)
+    grey: GreyBox = field(init=False, repr=False)
     rest: Rest = field(init=False, repr=False)
 
     def fit(self, data: TrainingSet, seed: int) -> None:
@@ -64,6 +65,16 @@ class Hybrid:
         """Simulate with the grey box from the state found in the n measured samples, and add the learnt rest."""
         y_hat = self.grey.simulate_whole(u, y_init)
         return (y_hat + self.rest.predict(u, y_hat))[:, y_init.shape[1] :]
+
+    def as_chosen(self) -> Hybrid:
+        """Return both, estimated on the training data alone, as networks of filters always are."""
+        alone = Hybrid()
+        alone.grey = self.grey.as_chosen()
+        alone.rest = Rest(tuple(
+            estimated_again(rest, alone.grey, output) if isinstance(rest, RestOfOutput) else rest
+            for output, rest in enumerate(self.rest.outputs)
+        ))  # fmt: skip
+        return alone
 
     def grey_and_rest(self) -> tuple[GreyBoxModel, Rest]:
         """Return the two whose outputs are added, for exports."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,7 +12,7 @@ from jaxtyping import Float
 
 from simgap.baselines.greybox import GreyBox
 from simgap.baselines.greybox_auto import GreyBoxAuto
-from simgap.protocol import is_stochastic
+from simgap.protocol import as_chosen, is_stochastic
 from simgap.records import Channel, Channels, Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -58,6 +59,12 @@ class Informed:
         for plant in self.grey.plants:
             columns.append(plant.contributions(u, y_init[:, :, list(plant.outputs)]))
         return np.concatenate(columns, axis=2)
+
+    def as_chosen(self) -> Informed:
+        """Return both models as validation data chose them."""
+        chosen = copy.copy(self)
+        chosen.grey, chosen.model = self.grey.as_chosen(), as_chosen(self.model)
+        return chosen
 
     @property
     def stochastic(self) -> bool:

@@ -82,6 +82,7 @@ class KernelNarxModel:
 
         chosen = _search(best_ridge, [s for s in self._structures() if s.lags < longest // 4], self.max_centres)
         _, ridge, structure = chosen
+        self._chosen = solved(_regression(train, structure, self.max_centres), structure, ridge)
         everything = scaled([*data.train, *data.valid], means, sizes)
         self.model = solved(_regression(everything, structure, self.max_centres), structure, ridge)
 
@@ -90,6 +91,10 @@ class KernelNarxModel:
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Run free after the n measured samples."""
         return self.model.simulate(u, y_init)
+
+    def as_chosen(self) -> KernelNarx:
+        """Return the model of the training data alone."""
+        return self._chosen
 
     @property
     def n_params(self) -> int:

@@ -20,11 +20,18 @@ class Mean:
     def fit(self, data: TrainingSet, seed: int) -> None:
         self.level = np.concatenate([e.y for e in data.train + data.valid]).mean(axis=0)  # [ny]
         self.n_params = len(self.level)
+        self._train = data.train
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         return np.tile(self.level, (len(u), u.shape[1] - y_init.shape[1], 1))
+
+    def as_chosen(self) -> Mean:
+        """Return the mean of the training data alone."""
+        chosen = Mean()
+        chosen.level = np.concatenate([e.y for e in self._train]).mean(axis=0)
+        return chosen
 
     def step_form(self, nu: int, ny: int) -> StepForm:
         """Write the model as a step, for exports."""

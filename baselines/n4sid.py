@@ -86,13 +86,18 @@ class N4sid:
                 best[order] = now, after
         models = [model for _, model in best.values()]
         chosen = simplest(models, [model.order for model in models], held_out, data.n_init)
-        self.model = refined(models[chosen], [*data.train, *data.valid], FINAL)
+        self._chosen = models[chosen]
+        self.model = refined(self._chosen, [*data.train, *data.valid], FINAL)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Run free from the state that the first n samples show."""
         return self.model.simulate(u, y_init)
+
+    def as_chosen(self) -> StateSpace:
+        """Return the model before its last refinement, which is on all data."""
+        return self._chosen
 
     @property
     def n_params(self) -> int:

@@ -58,13 +58,18 @@ class Narx:
         finished = [refined(model, records, data.n_init, STEPS) for _, model in safe[:REFINED]]
         best = min([safe[0], *((safe_error(model), model) for model in finished)], key=_first)
         best = self._pruned(best, records, safe_error, data.n_init)
-        self.model = refined_safely(best[1], [*data.train, *data.valid], data.n_init, STEPS)
+        self._chosen = best[1]
+        self.model = refined_safely(self._chosen, [*data.train, *data.valid], data.n_init, STEPS)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Run free after the n measured samples."""
         return self.model.simulate(u, y_init)
+
+    def as_chosen(self) -> PolynomialNarx:
+        """Return the model before its last refinement, which is on all data."""
+        return self._chosen
 
     @property
     def n_params(self) -> int:

@@ -65,13 +65,18 @@ class Sindy:
         tried = [(error(model), model) for model in trusted or [found[0][3]]]
         enough = (1 + WORTH) * min(of for of, _ in tried)
         chosen = min((len(model.theta), of, k) for k, (of, model) in enumerate(tried) if of <= enough)
-        self.model = refined_safely(tried[chosen[2]][1], [*data.train, *data.valid], data.n_init, STEPS)
+        self._chosen = tried[chosen[2]][1]
+        self.model = refined_safely(self._chosen, [*data.train, *data.valid], data.n_init, STEPS)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Run free after the n measured samples."""
         return self.model.simulate(u, y_init)
+
+    def as_chosen(self) -> PolynomialNarx:
+        """Return the model before its last refinement, which is on all data."""
+        return self._chosen
 
     @property
     def n_params(self) -> int:

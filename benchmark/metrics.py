@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from simgap.records import LARGEST_VALUE, Channels
+from simgap.records import LARGEST_VALUE, Channels, Experiment
 
 
 def score(y: Float[np.ndarray, " n"], y_hat: Float[np.ndarray, " n"]) -> dict[str, Any]:
@@ -51,6 +51,18 @@ def failed_metrics(channels: Channels) -> dict[str, dict[str, Any]]:
     """The figures of a model that simulated nothing: infinite errors over zero samples."""
     infinite = {"rmse": math.inf, "nrmse": math.inf, "fit_percent": -math.inf, "r2": -math.inf}
     return {c.name: infinite | {"mse": math.inf, "mae": math.inf, "n_scored": 0} for c in channels.outputs}
+
+
+def free_run_nrmse(simulate: Callable[..., np.ndarray], experiments: Sequence[Experiment], n_init: int) -> float:
+    """sqrt(mean over the outputs of mse / variance) of free runs from n_init measured samples; inf if one diverges."""
+    longer = [x for x in experiments if len(x) > n_init]
+    scored = np.concatenate([x.y[n_init:] for x in longer])
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors = [simulate(x.u[None], x.y[None, :n_init])[0] - x.y[n_init:] for x in longer]
+        mse = np.square(np.concatenate(errors)).mean(axis=0)  # [ny]
+    size = np.array([spread(of_output) or 1.0 for of_output in scored.T])
+    nrmse = float(np.sqrt(np.mean(mse / size**2)))
+    return nrmse if np.isfinite(nrmse) else math.inf
 
 
 def pool(values: Iterable[float], samples: Iterable[int]) -> float:

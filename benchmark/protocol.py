@@ -16,10 +16,11 @@ class Model(Protocol):
     """A model of a machine, fitted to measured data and simulated without them.
 
     Hyper-parameters are the fields of a dataclass; `fit` starts from nothing each time it is called.
-    Four attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
+    Five attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
     what the fit chose (an order, say) that goes into the results; `summary()`, a text for people; `stochastic`, True
     where another seed gives other numbers, as with a network trained from random weights (default False). It goes
-    into the results, and `simgap check` then grants the spread of the seeds instead of a rounding error.
+    into the results, and `simgap check` then grants the spread of the seeds instead of a rounding error. `as_chosen()`,
+    of a model that estimates on the validation data too: the model before it did, whose error on them is an honest one.
     A fitted model is saved attribute by attribute; `simgap.saved` says what it may declare for that.
     """
 
@@ -36,6 +37,12 @@ class Model(Protocol):
         forecast is many short ones.
         """
         ...
+
+
+def as_chosen(model: Any) -> Any:
+    """Return the model as validation data chose it, estimated on training data alone; None where it cannot say."""
+    method = getattr(model, "as_chosen", None)
+    return method() if callable(method) else model
 
 
 def is_stochastic(model: Any) -> bool:

@@ -217,7 +217,8 @@ class Result:
     """One line of the store: one model, simulated on one experiment of one data set, for one task and seed.
 
     `metrics` maps each output's name to its figures, in physical units. `message` says why when the status is
-    not ok, and carries warnings of the fit when it is. `fitted` is what the fit chose, such as an order.
+    not ok, and carries warnings of the fit when it is. `fitted` is what the fit chose, such as an order; `valid_nrmse`
+    the error of the free run on the validation data, before the model was estimated on them too, over their spread.
     """
 
     model: str
@@ -236,3 +237,4 @@ class Result:
     message: str = ""
     provenance: dict[str, Any] = field(default_factory=dict)
     schema: int = 1
+    valid_nrmse: float | None = None

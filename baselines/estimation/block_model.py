@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -34,13 +35,22 @@ class BlockModel(ABC):
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
-        self.outputs = [self._of_output(data, i) for i in range(len(data.channels.outputs))]
+        outputs = range(len(data.channels.outputs))
+        searches = [Search(self.kind, data.train, data.valid, i, data.n_init) for i in outputs]
+        chosen = [self._structure(data, search) for search in searches]
+        self.outputs = [search.on_everything(one) for search, one in zip(searches, chosen, strict=True)]
+        self._chosen = copy.copy(self)
+        self._chosen.outputs = chosen
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T-n ny"]:
         """Run free from the state that the first n samples show."""
         return np.stack([one.simulate(u, y_init[:, :, i]) for i, one in enumerate(self.outputs)], axis=2)
+
+    def as_chosen(self) -> BlockModel:
+        """Return the model before its last refinement, which is on all data."""
+        return self._chosen
 
     @property
     def n_params(self) -> int:
@@ -56,9 +66,8 @@ class BlockModel(ABC):
             chosen["curve" if name == "c" else f"n{name}"] = sizes[0] if len(sizes) == 1 else sizes
         return chosen
 
-    def _of_output(self, data: TrainingSet, output: int) -> Blocks:
-        search = Search(self.kind, data.train, data.valid, output, data.n_init)
-        records = excerpt(data.train, EXCERPT)
+    def _structure(self, data: TrainingSet, search: Search) -> Blocks:
+        records, output = excerpt(data.train, EXCERPT), search.output
         shift = rough_means(data.train, True)
         ny = len(data.channels.outputs)
         first: Kind = "hammerstein" if self.kind == "hammerstein" else "wiener"
@@ -73,7 +82,7 @@ class BlockModel(ABC):
         least = min(error for error, _ in found)
         linear = next(linear for error, linear in found if error <= (1 + WORTH) * least)
         chosen = starts(self.kind, records, output, *linear, *mean)
-        return search.on_everything(search.best(chosen))
+        return search.best(chosen)
 
 
 def _linear(

@@ -78,6 +78,11 @@ class LinearModel(ABC):
         """Run free from the state that the first n samples show."""
         return self.polynomial.simulate(u, y_init)
 
+    def as_chosen(self) -> Polynomial:
+        """Estimate the same orders on the training data alone."""
+        data, orders = self._data, self.result.orders
+        return self.estimator(data.train, data.n_init, orders.max_lag)(orders, self.result).polynomial
+
     @property
     def polynomial(self) -> Polynomial:
         """The identified difference equation."""

@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from simgap.greybox.baseline import Baseline
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.inner_filter import with_inner_filter
 from simgap.greybox.kind_of_output import Settled, settle
 from simgap.greybox.linear import find_baseline
@@ -38,6 +40,11 @@ class Identified:
     settled: Settled | None = None  # what its output is, where nobody had said it
     linear: LinearRival | None = None  # the linear model that does as well
 
+    @property
+    def chosen(self) -> tuple[Estimate, Baseline]:
+        """What was found on excerpts of the training data, and the plain model that it was built on."""
+        return _chosen(self.selection, self.linear)
+
     @cached_property
     def plain(self) -> FittedPlant:
         """The plain linear plant that gains are counted from."""
@@ -62,9 +69,15 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             selection = with_inner_filter(selection, of_kind)
             linear = linear_rival(data, of_kind, selection)
-        best = (linear.baseline.estimate, linear.baseline) if linear else (selection.trial.estimate, selection.baseline)
-        identified.append(Identified(selection, FittedPlant.fit(*best, experiments), settled, linear))
+        plant = FittedPlant.fit(*_chosen(selection, linear), experiments)
+        identified.append(Identified(selection, plant, settled, linear))
     return identified
+
+
+def _chosen(selection: Selection, linear: LinearRival | None) -> tuple[Estimate, Baseline]:
+    if linear is not None:
+        return linear.baseline.estimate, linear.baseline
+    return selection.trial.estimate, selection.baseline
 
 
 def channels_of(identified: Sequence[Identified], data: TrainingSet) -> Channels:

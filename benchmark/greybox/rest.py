@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -107,6 +107,17 @@ def learn(model: GreyBoxModel, seed: int) -> Rest:
         for plant in model.plants:
             outputs |= zip(plant.outputs, _learn_plant(plant, y_hat, seed), strict=True)
     return Rest(tuple(outputs[i] for i in sorted(outputs)))
+
+
+def estimated_again(rest: RestOfOutput, model: GreyBoxModel, output: int) -> RestOfOutput:
+    """Estimate the same regression of one output from the training errors of another fit of its model."""
+    y_hat = simulated(model)
+    plant = next(plant for plant in model.plants if output in plant.outputs)
+    rows, e = _spread_rows(plant.records.mask), plant.estimate.errors
+    phi = np.concatenate([block[rows] for block in rest.features.blocks(plant.records.u, y_hat)], axis=1)
+    own = e[..., [plant.outputs.index(output)]]
+    again = _Regressions.fit(phi, own[rows], folds(own, plant.records.mask)[rows])
+    return replace(rest, means=again.means, coefficients=again.coefficients[:, 0].copy())
 
 
 def simulated(model: GreyBoxModel) -> Float[np.ndarray, "E T ny"]:

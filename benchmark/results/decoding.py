@@ -36,11 +36,12 @@ class StoredRow(msgspec.Struct, forbid_unknown_fields=True):
     message: str = ""
     provenance: dict[str, Any] = {}
     schema: Literal[1] = 1
+    valid_nrmse: int | float | None = None
 
 
 _TYPES = get_type_hints(StoredRow)
 _REQUIRED = tuple(field.name for field in msgspec.structs.fields(StoredRow) if field.required)
-_LIMITED = ("seed", "n_params", "fit_seconds", "simulate_seconds")
+_LIMITED = ("seed", "n_params", "fit_seconds", "simulate_seconds", "valid_nrmse")
 _DECODER = msgspec.json.Decoder(StoredRow)
 
 

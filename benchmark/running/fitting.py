@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import time
 import traceback
 import warnings
@@ -15,8 +16,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.metrics import failed_metrics
-from simgap.protocol import Model, is_stochastic
+from simgap.metrics import failed_metrics, free_run_nrmse
+from simgap.protocol import Model, as_chosen, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
@@ -127,8 +128,9 @@ def score_model(
 ) -> tuple[list[Result], dict[str, Float[np.ndarray, "N ny"]]]:
     """Score every test experiment for every task, and give the free run of each that was simulated.
 
-    A model that fails on one is still asked for the others.
+    A model that fails on one is still asked for the others. Each row has the error on the validation data, too.
     """
+    about = replace(about, valid_nrmse=validation_error(model, dataset.training))
     results, runs = [], {}
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
@@ -138,6 +140,21 @@ def score_model(
             runs[experiment.name] = evaluation.free_run
     units = {channel.name: channel.unit for channel in dataset.channels.outputs}
     return [replace(result, units=units) for result in results], runs
+
+
+def validation_error(model: Model, training: TrainingSet) -> float | None:
+    """Compute the error of the free run on validation data of the model as these chose it; None where there is none."""
+    if not any(len(x) > training.n_init for x in training.valid):
+        return None
+    try:
+        chosen = as_chosen(model)
+        if chosen is None:
+            return None
+        simulate = CheckedSimulation(chosen, len(training.channels.outputs))
+        nrmse = free_run_nrmse(simulate, training.valid, training.n_init)
+    except (Exception, SystemExit):  # a model may raise anything; what it does on the test is another matter
+        return None
+    return nrmse if math.isfinite(nrmse) else None
 
 
 def _score(evaluation: Evaluation, simulate: CheckedSimulation, task: Task, about: Result) -> Result:
