@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from simgap.protocol import Model
+from simgap.protocol import Model, as_chosen
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 from simgap.results.store import plain
@@ -62,7 +62,7 @@ class Candidate:
                 raise ModelFault("fit changed the data it was given")
         return model
 
-    def simulate(self, u: np.ndarray, y_init: np.ndarray, model: Model | None = None) -> np.ndarray:
+    def simulate(self, u: np.ndarray, y_init: np.ndarray, model: Any = None) -> np.ndarray:
         """Raises ModelFault for an answer that the bench would not take."""
         try:
             return CheckedSimulation(model or self.fitted, 2)(u, y_init)
@@ -71,7 +71,7 @@ class Candidate:
         except (Exception, SystemExit) as error:
             raise ModelFault(reason("simulate", error)) from error
 
-    def one(self, experiment: Experiment, model: Model | None = None, n: int = N_INIT) -> np.ndarray:
+    def one(self, experiment: Experiment, model: Any = None, n: int = N_INIT) -> np.ndarray:
         """The simulation of one experiment, [T-n, ny]."""
         return self.simulate(experiment.u[None], experiment.y[None, :n], model)[0]
 
@@ -111,6 +111,18 @@ def it_fits_and_says_plainly_what_it_chose(candidate: Candidate) -> None:
 def it_returns_the_rows_after_the_start_as_float64(candidate: Candidate) -> None:
     if not np.isfinite(candidate.one(toy_experiment(9))).all():
         raise ModelFault("simulate returned values that are not finite for a plant that is well damped")
+
+
+def it_says_what_it_was_before_it_was_estimated_on_validation_data(candidate: Candidate) -> None:
+    chosen, experiment, training = as_chosen(candidate.fitted), toy_experiment(9), toy_training()
+    if chosen is not candidate.fitted:
+        if chosen is not None:
+            candidate.one(experiment, chosen)
+        return
+    # Whoever only compares on validation data chooses the same where all of them stand there twice.
+    twice = candidate.fit(candidate.build(), replace(training, valid=2 * training.valid))
+    why = "fit estimates on the validation data, so it needs a method as_chosen that returns the model before that"
+    _alike(candidate.one(experiment), candidate.one(experiment, twice), 1e-9, why)
 
 
 def a_batch_equals_one_by_one(candidate: Candidate) -> None:
@@ -192,6 +204,7 @@ def toy_errors(candidate: Candidate) -> tuple[float, float]:
 CHECKS: tuple[Check, ...] = (
     it_has_a_docstring,
     it_fits_and_says_plainly_what_it_chose,
+    it_says_what_it_was_before_it_was_estimated_on_validation_data,
     it_returns_the_rows_after_the_start_as_float64,
     it_leaves_its_inputs_as_they_were,
     a_batch_equals_one_by_one,

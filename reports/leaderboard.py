@@ -10,6 +10,7 @@ import pandas as pd
 
 from simgap.records import Result, UnusableInput
 from simgap.reports import recovery
+from simgap.reports.chosen import chosen_table
 from simgap.reports.collection import Collection
 from simgap.reports.crossover import crossover_tables, of_crossover
 from simgap.reports.error_ratios import Ratios, error_ratios
@@ -83,7 +84,7 @@ def tables_of(results: list[Result], crossover: Sequence[Result] = (), ratios: R
     """
     if of_crossover(results):
         return crossover_tables(results)
-    of_all = [table for table in (skill_table(results), modes_table(results)) if table]
+    of_all = [table for table in (chosen_table(results), skill_table(results), modes_table(results)) if table]
     return [*_of_paper(results, crossover), overview(results, ratios), *of_all, *_of_datasets(results, ratios)]
 
 

@@ -50,6 +50,13 @@ class Standing:
         fit = self.fit_percent()
         return fit.median if fit else -math.inf
 
+    def valid_fit(self) -> Spread | None:
+        """Compute the fit in percent on the validation data; None where no row has one, -inf for a seed without."""
+        of_seed = {row.seed: row.valid_nrmse for row in self.rows}
+        if set(of_seed.values()) == {None}:
+            return None
+        return Spread.of([-math.inf if nrmse is None else 100 * (1 - nrmse) for nrmse in of_seed.values()])
+
     def rmse_at(self, output: str, horizon: str) -> Spread | None:
         """Pool the RMSE of the forecast `horizon` samples ahead, over all test experiments."""
 

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 # Columns of words.
 LEFT = ("model", "data set", "best classical", "best network", "winner", "tool", "figure", "hidden", "status", "claim",
-        "section", "judgement", "verdict", "evidence", "the paper's figures")  # fmt: skip
+        "section", "judgement", "verdict", "evidence", "the paper's figures", "chosen", "RMSE on the test",
+        "best on the test")  # fmt: skip
 WIDEST_WORD = 18  # of a heading on a terminal, where longer ones are broken
 WIDEST_TEXT = 24  # of a column of words on a narrow terminal; a wide one gives half of what numbers leave
 

@@ -53,7 +53,7 @@ def tidy(results: Sequence[Result]) -> pd.DataFrame:
             "seed": result.seed, "status": result.status,
         }  # fmt: skip
         last = {
-            "n_params": result.n_params, "fit_seconds": result.fit_seconds,
+            "valid_nrmse": result.valid_nrmse, "n_params": result.n_params, "fit_seconds": result.fit_seconds,
             "simulate_seconds": result.simulate_seconds, "message": result.message,
         }  # fmt: skip
         for output, figures in result.metrics.items():
@@ -95,9 +95,7 @@ def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, 
     """
     found = [standing for standing in standings(results) if standing.dataset == dataset]
     rows_of = [row for standing in found for row in standing.rows]
-    experiments = list(dict.fromkeys(row.experiment for row in rows_of))
-    units = {output: row.units.get(output, "") for row in rows_of for output in row.metrics}
-    groups = [[e] for e in experiments] if 1 < len(experiments) <= COLUMNS_PER_EXPERIMENT else [experiments]
+    units, groups = units_of(rows_of), experiment_groups(rows_of)
     horizons = _horizons(rows_of)
     notes = Notes()
     found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
@@ -120,6 +118,17 @@ def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, 
     columns = _columns(units, groups, horizons, bool(ratios))
     how_to_read = [HOW_TO_READ] if ratios else []
     return Table(dataset, columns, rows, [*notes.texts, *how_to_read, *warnings_of(rows_of)])
+
+
+def units_of(rows: Sequence[Result]) -> dict[str, str]:
+    """List the outputs with their units."""
+    return {output: row.units.get(output, "") for row in rows for output in row.metrics}
+
+
+def experiment_groups(rows: Sequence[Result]) -> list[list[str]]:
+    """Group the test experiments into those of one figure each: a few stand apart, many are pooled."""
+    experiments = list(dict.fromkeys(row.experiment for row in rows))
+    return [[e] for e in experiments] if 1 < len(experiments) <= COLUMNS_PER_EXPERIMENT else [experiments]
 
 
 def warnings_of(rows: Sequence[Result]) -> list[str]:

@@ -180,7 +180,7 @@ def _score(evaluation: Evaluation, simulate: CheckedSimulation, task: Task, abou
 class CheckedSimulation:
     """`model.simulate` on copies of the data, with its answer checked and its time added up in `seconds`."""
 
-    model: Model
+    model: Any  # a Model, or what a model was before the validation data
     ny: int
     seconds: float = field(default=0.0, init=False)
 

@@ -11,6 +11,7 @@ from simgap.data import describe
 from simgap.records import UnusableInput
 from simgap.registry import MODELS
 from simgap.reports import recovery
+from simgap.reports.chosen import chosen_table
 from simgap.reports.collection import Collection, Run, group_of
 from simgap.reports.crossover import crossover_tables, of_crossover
 from simgap.reports.error_ratios import error_ratios
@@ -122,8 +123,8 @@ class _Site:
             table = overview(rows, self.ratios.get(name))
             shown = [row[0].text for row in table.rows]
             suites.append({
-                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "skill": skill_table(rows),
-                "modes": modes_table(rows),
+                "name": name, "about": ABOUT_SUITE.get(name, ""), "overview": table, "chosen": chosen_table(rows),
+                "skill": skill_table(rows), "modes": modes_table(rows),
                 "groups": self.groups, "group_names": sorted(unique(self.groups[label] for label in shown)),
                 "paper": of_paper(rows),
             })  # fmt: skip

@@ -8,6 +8,7 @@ import simgap
 from simgap.cli import main
 
 BROKEN = """
+from dataclasses import replace
 import numpy as np
 
 class Base:
@@ -79,6 +80,11 @@ class Guesses(Base):
     "stochastic is no yes or no."
     stochastic = 0.3
 
+class Refits(Base):
+    "Estimates on validation data and does not say so."
+    def fit(self, data, seed):
+        super().fit(replace(data, train=data.train + data.valid), seed)
+
 class NeedsMany(Base):
     "Wants two samples to start."
     def simulate(self, u, y_init):
@@ -107,6 +113,7 @@ def broken(tmp_path):
         ("Nameless", "the class has no docstring"),
         ("Counts", "n_params is 'many'"),
         ("Guesses", "stochastic is 0.3; make it True"),
+        ("Refits", "it needs a method as_chosen"),
         ("NeedsMany", "simulate raised IndexError"),
     ],
 )
@@ -121,7 +128,7 @@ def test_try_model_passes_what_is_right(broken, capsys, tmp_path):
     assert main(["try-model", f"{broken}:Base", "--json", str(tmp_path / "told.json")]) == 0
     printed = capsys.readouterr().out
     assert "WRONG" not in printed
-    assert "12 of 12 checks passed" in printed
+    assert "13 of 13 checks passed" in printed
     assert not any(check["wrong"] for check in json.loads((tmp_path / "told.json").read_text())["checks"])
 
 

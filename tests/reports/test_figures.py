@@ -23,8 +23,9 @@ def written(results_on_disk, tmp_path_factory):
 def test_each_table_and_each_picture_is_there_in_each_format(written):
     assert sorted(file.name for file in written) == [
         "recovery-confusion.pdf", "recovery-confusion.svg", "smoke-Free-run-fit-in-percent.tex",
-        "smoke-gimbal_short-free-run.pdf", "smoke-gimbal_short-free-run.svg", "smoke-gimbal_short-horizon.pdf",
-        "smoke-gimbal_short-horizon.svg", "smoke-gimbal_short.tex",
+        "smoke-The-row-that-validation-data-choose.tex", "smoke-gimbal_short-free-run.pdf",
+        "smoke-gimbal_short-free-run.svg", "smoke-gimbal_short-horizon.pdf", "smoke-gimbal_short-horizon.svg",
+        "smoke-gimbal_short.tex",
     ]  # fmt: skip
     for file in written:
         if file.suffix == ".pdf":
