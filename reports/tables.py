@@ -161,9 +161,9 @@ def spread_cell(spread: Spread | None, form: str, failed: bool) -> Cell:
         return Cell("")
     if failed and math.isinf(spread.median):
         return Cell("-", spread.median)
-    text = format(spread.median, form)
-    if spread.low != spread.high:
-        text += f" ({spread.low:{form}} to {spread.high:{form}})"
+    text, low, high = (format(figure, form) for figure in (spread.median, spread.low, spread.high))
+    if low != high:
+        text += f" ({low} to {high})"
     return Cell(text, spread.median)
 
 

@@ -17,8 +17,8 @@ from simgap.results import store
 
 Change = Literal["same", "better", "worse", "missing", "new"]
 
-# Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it;
-# and of one whose numbers depend on the seed, where three times the spread of its seeds counts if that is more.
+# Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it,
+# and of one whose numbers depend on the seed; three times the spread of the seeds counts if that is more.
 COMPUTED = 1e-5
 STOCHASTIC = 0.05
 SIGMAS = 3.0
@@ -66,10 +66,11 @@ class Regression:
 def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
     """Compare the results in a folder with those of a reference, suite by suite.
 
-    An RMSE is worse when it exceeds the reference by more than 1e-5 of it or, for a model that declares itself
-    stochastic, by more than max(3 sigma of the reference's seeds, 5 %). Their geometric mean per model and data set is
-    worse by more than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when
-    the new results lack it although they have its seed. Raises UnusableInput.
+    An RMSE is worse when it exceeds the reference by more than max(3 sigma of the reference's seeds, 1e-5 of it) or, for
+    a model that declares itself stochastic, max(3 sigma, 5 %). The seeds of a model that only computes differ by how
+    rounding falls (`simgap.running.rounding`). The geometric mean of the RMSEs per model and data set is worse by more
+    than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when the new results
+    lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
     for folder in (new, reference):
@@ -152,9 +153,9 @@ class _Group:
     def _allowed(self, value: float, sigma: float, scale: float) -> float:
         if not math.isfinite(value):
             return 0.0
-        if self._stochastic or sigma > COMPUTED * value:
+        if self._stochastic:
             return max(SIGMAS * sigma, STOCHASTIC * value)
-        return COMPUTED * value + ROUNDING * scale
+        return max(SIGMAS * sigma, COMPUTED * value) + ROUNDING * scale
 
     def _judged(
         self, figure: str, seed: int | None, before: float, after: float, limit: float, row: Result | None

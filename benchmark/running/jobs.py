@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from simgap.metrics import failed_metrics
-from simgap.protocol import Model
+from simgap.protocol import Model, is_stochastic
 from simgap.records import Channels, Dataset, Result, Status
 from simgap.registry import MODELS
 from simgap.results import artefacts
@@ -22,6 +22,7 @@ from simgap.results.artefacts import Artefact
 from simgap.results.store import plain
 from simgap.running.engines.engine import shared_folder
 from simgap.running.fitting import build, fit_model, model_class, reason, score_model
+from simgap.running.rounding import in_other_units
 from simgap.running.source import Code, code_of
 from simgap.running.suites import Entry
 from simgap.tasks import TASKS
@@ -124,7 +125,9 @@ class Job:
             return self.failed("error", "the data set changed while the run was under way; run again")
         try:
             model = build(self.entry.name, self.entry.params)
-            about = fit_model(model, dataset.training, self.about)
+            # A model without randomness has seeds too: they show how much rounding moves it.
+            training = dataset.training if is_stochastic(model) else in_other_units(dataset.training, self.seed)
+            about = fit_model(model, training, self.about)
         except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
             return self.failed("error", reason("fit", error))
         try:
