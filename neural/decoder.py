@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed, Recurrences
-from simgap.neural.training.network import LONG, Network
+from simgap.neural.training.network import Network
 from simgap.neural.training.recurrent import Lstm, recurrent
 from simgap.registry import MODELS
 
@@ -15,8 +14,6 @@ from simgap.registry import MODELS
 @dataclass
 class Decoder(Network):
     """LSTM(first) - LSTM(second) - FC(ny); model 7 of the paper, which gives no widths: 8 and 16 here."""
-
-    stateful: ClassVar = LONG
 
     first: int = 8
     second: int = 16

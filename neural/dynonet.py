@@ -24,7 +24,7 @@ class DynoNet(Network):
     """
 
     stateful: ClassVar = replace(
-        STATEFUL, epochs=160, learning_rate=1e-2, patience=8, early_stop=40, batches=60
+        STATEFUL, epochs=160, learning_rate=1e-2, patience=8, early_stop=40
     )  # fmt: skip
     free: ClassVar[int] = 300
 

@@ -22,7 +22,7 @@ class LRU(Network):
     with 30 epochs at 3e-3 and three layers of 32, 1.3 with this.
     """
 
-    stateful: ClassVar = replace(STATEFUL, epochs=100, learning_rate=1e-2, patience=5, early_stop=30, batches=60)
+    stateful: ClassVar = replace(STATEFUL, epochs=100, learning_rate=1e-2, patience=5, early_stop=30)
 
     units: int = 24
     states: int = 24

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed, Recurrences
-from simgap.neural.training.network import LONG, Network
+from simgap.neural.training.network import Network
 from simgap.neural.training.recurrent import Lstm, recurrent
 from simgap.registry import MODELS
 
@@ -15,8 +14,6 @@ from simgap.registry import MODELS
 @dataclass
 class LSTM(Network):
     """LSTM(units) - FC(ny); model 3 of the paper, which gives no width: 32 units here."""
-
-    stateful: ClassVar = LONG
 
     units: int = 32
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed
 from simgap.neural.training.linear_blocks import Stacked, Static
-from simgap.neural.training.network import LONG, Network
+from simgap.neural.training.network import STATEFUL, Network
 from simgap.neural.training.state_space import StateSpace
 from simgap.registry import MODELS
 
@@ -22,7 +22,7 @@ class Subnet(Network):
     trains was chosen on the validation part of the Silverbox: 0.51 mV after 160 epochs, 0.25 after 700.
     """
 
-    stateful: ClassVar = replace(LONG, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
+    stateful: ClassVar = replace(STATEFUL, epochs=700, learning_rate=5e-3, patience=25, early_stop=120)
     free: ClassVar[int] = 300
 
     pairs: int = 4

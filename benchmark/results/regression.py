@@ -66,8 +66,8 @@ class Regression:
 def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
     """Compare the results in a folder with those of a reference, suite by suite.
 
-    An RMSE is worse when it exceeds the reference by more than max(3 sigma of the reference's seeds, 1e-5 of it) or, for
-    a model that declares itself stochastic, max(3 sigma, 5 %). The seeds of a model that only computes differ by how
+    An RMSE is worse when it exceeds the reference by more than max(3 sigma of the reference's seeds, 1e-5 of it), or
+    max(3 sigma, 5 %) for a model that declares itself stochastic. The seeds of a model that only computes differ by how
     rounding falls (`simgap.running.rounding`). The geometric mean of the RMSEs per model and data set is worse by more
     than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when the new results
     lack it although they have its seed. Raises UnusableInput.

@@ -25,9 +25,8 @@ from simgap.records import TrainingSet, UnusableInput
 from simgap.step_form import StepForm
 
 WINDOWED = Recipe(epochs=30, batch=32, learning_rate=1e-4, patience=1, early_stop=10)
-STATEFUL = Recipe(epochs=30, batch=32, learning_rate=3e-3, patience=3, early_stop=10, improvement=0.0, batches=40)
-# Chosen on validation data: recurrent networks have not learnt in 30 epochs what longer records can teach them.
-LONG = replace(STATEFUL, epochs=300, patience=15, early_stop=60, batches=60)
+# Chosen on validation data: networks have not learnt in 30 epochs what longer records can teach them.
+STATEFUL = Recipe(epochs=300, batch=32, learning_rate=3e-3, patience=15, early_stop=60, improvement=0.0, batches=60)
 # Free runs of held-out data on which the best epoch is chosen: samples of each, and how many.
 HELD_OUT = (1000, 32)
 # Samples that are simulated at once.
