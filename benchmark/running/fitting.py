@@ -21,6 +21,7 @@ from simgap.protocol import Model, as_chosen, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
+from simgap.running.annotations import fits, hints_of, in_words
 from simgap.running.provenance import provenance
 from simgap.running.workers import threads_in_force
 from simgap.tasks import TASKS, USUAL, Evaluation, Task
@@ -80,13 +81,17 @@ def model_class(reference: str) -> type:
 
 
 def check_params(reference: str, params: dict[str, Any]) -> None:
-    """Raises UnusableInput when the model takes no such parameters."""
-    signature = inspect.signature(model_class(reference))
+    """Raises UnusableInput when the model takes no such parameters, or none of such a type."""
+    kind = model_class(reference)
+    signature, hints = inspect.signature(kind), hints_of(kind)
     try:
         signature.bind(**params)
     except TypeError as error:
         known = ", ".join(signature.parameters) or "none"
         raise UnusableInput(f"{reference}: {error}; its parameters are {known}") from error
+    for name, value in params.items():
+        if name in hints and not fits(value, hints[name]):
+            raise UnusableInput(f"{reference}: {name} = {value!r}, where {in_words(hints[name])} is needed")
 
 
 def build(reference: str, params: dict[str, Any]) -> Model:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
 import numpy as np
 from jaxtyping import jaxtyped
 
 from simgap.records import UnusableInput
 from simgap.registry import EFFECTS, MODELS
+from simgap.running.annotations import fits, hints_of
 
 # Kinds of NumPy numbers that a file holds: booleans, whole numbers and floats.
 NUMBERS = "biuf"
-# What else passes for a number in Python.
-ALSO = {float: (float, int, np.floating, np.integer), int: (int, np.integer), bool: (bool, np.bool_)}
 
 
 @dataclass
@@ -132,31 +130,11 @@ def build_record(part: type, state: dict[str, Any]) -> Any:
 
 def check_types(kind: type, state: dict[str, Any]) -> None:
     """Raise TypeError for an attribute that is not of its annotated type and shape; one letter is one size in all."""
-    try:
-        hints = get_type_hints(kind)
-    except NameError:  # a stranger's model may be annotated with what is not there at run time
-        return
+    hints = hints_of(kind)
     with jaxtyped("context"):
         for name, value in state.items():
             if name in hints and not fits(value, hints[name]):
                 raise TypeError(f"the {name} of a {kind.__name__} is not of its type and shape")
-
-
-def fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of an annotated type, as far as that is made of classes, Literal, unions, lists and tuples."""
-    origin, args = get_origin(hint), get_args(hint)
-    if origin is Literal:
-        return value in args
-    if origin in (Union, UnionType):
-        return any(fits(value, one) for one in args)
-    if origin in (list, tuple):
-        if not isinstance(value, origin):
-            return False
-        items = args if origin is tuple and args[-1] is not ... else args[:1] * len(value)
-        return len(value) == len(items) and all(map(fits, value, items))
-    if hint is Any or not isinstance(origin or hint, type):
-        return True
-    return isinstance(value, ALSO.get(hint, origin or hint))
 
 
 def state_of(value: Any) -> dict[str, Any]:

@@ -30,6 +30,35 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones(example):
     check_params(example("Scaled"), {"factor": 1})
 
 
+@pytest.mark.parametrize(
+    ("model", "params", "words"),
+    [
+        ("subnet", {"pairs": "x"}, "subnet: pairs = 'x', where a whole number is needed"),
+        ("arx", {"na": 2.5}, "arx: na = 2.5, where a whole number or a list or null is needed"),
+        ("gru", {"mode": "dreamt"}, "gru: mode = 'dreamt', where windowed or stateful is needed"),
+        ("gru", {"learning_rate": "fast"}, "gru: learning_rate = 'fast', where a number is needed"),
+        ("gru", {"resident": 1}, "gru: resident = 1, where true or false is needed"),
+    ],
+)
+def test_a_parameter_of_another_type_is_refused_in_words(model, params, words):
+    with pytest.raises(UnusableInput) as refused:
+        check_params(model, params)
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(
+    ("model", "params"),
+    [
+        ("gru", {"learning_rate": 1}),
+        ("arx", {"na": [[2]]}),
+        ("greybox", {"effects": "backlash"}),
+        ("arx", {"na": None}),
+    ],
+)
+def test_a_parameter_may_be_written_in_any_way_that_its_type_allows(model, params):
+    check_params(model, params)
+
+
 def test_every_exported_name_exists():
     for name in simgap.__all__:
         assert getattr(simgap, name) is not None
