@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simgap.running.fitting import Fit, fit
     from simgap.running.runner import run
     from simgap.running.suites import Suite, load_suite
+    from simgap.running.tuning import Range, tune
     from simgap.saved.archive import load_model, save_model
     from simgap.saved.simulate import Simulation, simulate
 
@@ -45,6 +46,7 @@ _HOME = {
     "simgap.running.execution": ("Progress",),
     "simgap.running.runner": ("run",),
     "simgap.running.suites": ("Suite", "load_suite"),
+    "simgap.running.tuning": ("Range", "tune"),
     "simgap.saved.archive": ("load_model", "save_model"),
     "simgap.saved.simulate": ("Simulation", "simulate"),
 }  # fmt: skip
@@ -52,9 +54,9 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "DATASETS", "EFFECTS", "MODELS", "Channel", "Channels", "Dataset", "Experiment", "Fit", "Missing", "Model",
-    "Progress", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "Verification",
+    "Progress", "Range", "Regression", "Result", "Simulation", "Suite", "TrainingSet", "UnusableInput", "Verification",
     "check", "choose_record", "describe", "diagnose", "export", "fetch", "fit", "load", "load_model", "load_suite",
-    "next_record", "report", "run", "save", "save_model", "simulate", "verify", "write_figures", "write_site",
+    "next_record", "report", "run", "save", "save_model", "simulate", "tune", "verify", "write_figures", "write_site",
 ]  # fmt: skip
 
 

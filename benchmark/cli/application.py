@@ -24,6 +24,7 @@ from simgap.cli import (
     run,
     simulate,
     try_model,
+    tune,
 )
 from simgap.cli import list as catalogue
 from simgap.cli import next as next_command
@@ -47,6 +48,7 @@ app.command("next")(next_command.next_record)
 app.command("fit")(fit.fit)
 app.command("simulate")(simulate.simulate)
 app.command("export")(export.export)
+app.command("tune")(tune.tune)
 app.command("range-test")(range_test.range_test)
 app.command("check")(check.check)
 app.command("new-model")(new_model.new_model)
