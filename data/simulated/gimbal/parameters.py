@@ -75,6 +75,20 @@ class Gimbal:
         }
         return cls(**(off | changes))
 
+    @classmethod
+    def of_gm6020(cls) -> Gimbal:
+        """Make the yaw axis of a robot that a GM6020 motor turns without a gear; what nobody measured is as usual.
+
+        Inertia and damping as identified by others, dry friction in the middle of their 0.1 to 0.3 N m
+        (LYHrmer/gimbal-lqr-eso); torque per current and 8192 counts from the maker. Were all damping back-EMF, the
+        winding would have k^2 / damping = 2.27 Ohm and an idle motor at 24 V 309 rpm; the resistance is that.
+        """
+        k, damping = 0.741, 0.242
+        return cls(
+            yaw_inertia=0.0343, motor_inertia=0.0, gear=1.0, torque_constant=k, resistance=k**2 / damping, viscous=0.0,
+            coulomb=0.2, quantisation=(360 / 8192, 0.0),
+        )  # fmt: skip
+
     @property
     def inertia(self) -> float:
         """kg m^2 at the yaw axis."""

@@ -70,11 +70,36 @@ def gimbal(
 
     Reference: "Recurrent and Convolutional approaches for System Identification", section 2.
     """
+    return _under(DEFAULT, "gimbal", data, noise, friction, drift, stiffness, delay, n_init)
+
+
+@DATASETS.register("gm6020")
+def gm6020(
+    data: float = 1.0,
+    noise: float = 1.0,
+    friction: float = 1.0,
+    drift: float = 1.0,
+    stiffness: float = 1.0,
+    delay: float = 0.0,
+    n_init: int = 40,
+) -> Dataset:
+    """Yaw motion of a robot on a GM6020 motor: simulated with inertia, damping and friction that others measured.
+
+    Inputs, sensors, experiments and parameters behind the name as for `gimbal`; the axis has no gear, half the damping
+    and turns three times as far (`Gimbal.of_gm6020`). Raises UnusableInput.
+    """
+    return _under(Gimbal.of_gm6020(), "gm6020", data, noise, friction, drift, stiffness, delay, n_init)
+
+
+def _under(
+    usual: Gimbal, name: str, data: float, noise: float, friction: float, drift: float, stiffness: float,
+    delay: float, n_init: int,
+) -> Dataset:  # fmt: skip
+    """Record a gimbal under conditions that are given as multiples of the usual ones, delay [s] and n_init as such."""
     n_train = round(N_TRAIN * data)
     if not 1 <= n_train <= MOST_TRAIN:
         made = f"data={data:g} makes {n_train} training experiments"
-        raise UnusableInput(f"gimbal: {made}; 1 to {MOST_TRAIN} can be made")
-    usual = DEFAULT
+        raise UnusableInput(f"{name}: {made}; 1 to {MOST_TRAIN} can be made")
     parameters = replace(
         usual,
         noise=(noise * usual.noise[0], noise * usual.noise[1]),
@@ -83,7 +108,7 @@ def gimbal(
         cable_stiffness=stiffness * usual.cable_stiffness,
         input_delay=delay,
     )
-    return gimbal_dataset(parameters, n_train=n_train, n_init=n_init)
+    return gimbal_dataset(parameters, n_train=n_train, n_init=n_init, name=name)
 
 
 @DATASETS.register("gimbal_short")
