@@ -52,6 +52,6 @@ def test_a_folder_of_such_a_name_is_the_folder(tmp_path, monkeypatch):
 
 def test_every_condition_of_the_crossover_study_is_called_as_it_is_made():
     names = load_suite("crossover").datasets
-    assert len(set(names)) == len(names) == 24
+    assert len(set(names)) == len(names) == 25
     assert "gimbal" in names
     assert load(names[-1]).name == names[-1]
