@@ -9,10 +9,11 @@ from simgap.reports.pooling import Standing, standings
 from simgap.reports.tables import Cell, Table, experiment_groups, spread_cell, units_of
 
 HOW_TO_READ = (
-    "Chosen: the row whose free run errs least on the validation data, in the median over its seeds, estimated on the "
-    "training data alone with all else as validation data chose it. The test had no part in it. RMSE and fit: on the "
-    "test, of the row as committed, estimated on the validation data too where a model does that. With several seeds: "
-    "median (range). Best on the test: found with the test, which nobody can do in practice."
+    "Rows: how many have an error on the validation data. Chosen: the one whose free run errs least on them, in the "
+    "median over its seeds, estimated on the training data alone with all else as validation data chose it. The test "
+    "had no part in it. RMSE and fit: on the test, of the row as committed, estimated on the validation data too "
+    "where a model does that. With several seeds: median (range). Best on the test: found with the test, which "
+    "nobody can do in practice."
 )
 
 
@@ -35,7 +36,7 @@ def _row(dataset: str, found: Sequence[Standing]) -> list[Cell] | None:
     best = max(found, key=lambda standing: standing.median_fit)
     seeds = len({row.seed for row in chosen.rows})
     return [
-        Cell(dataset), Cell(f"{len(known)}"), Cell(chosen.model), Cell(f"{seeds}"), spread_cell(fit, "z.1f", False),
+        Cell(dataset), Cell(f"{len(known)} of {len(found)}"), Cell(chosen.model), Cell(f"{seeds}"), spread_cell(fit, "z.1f", False),
         Cell(_errors(chosen)), spread_cell(chosen.fit_percent(), "z.1f", chosen.failed),
         Cell(best.model, best=best is chosen), spread_cell(best.fit_percent(), "z.1f", best.failed),
     ]  # fmt: skip

@@ -14,7 +14,7 @@ def row(model, nrmse, valid, experiment="test", seed=0):
 def test_the_row_that_errs_least_on_validation_data_is_chosen_whatever_the_test_says():
     table = chosen_table([row("oe", 0.3, 0.2), row("arx", 0.1, 0.4), row("mean", 1.0, None)])
     assert [cell.text for cell in table.rows[0]] == [
-        "tanks", "2", "oe", "1", "80.0", "0.6 V", "70.0", "arx", "90.0",
+        "tanks", "2 of 3", "oe", "1", "80.0", "0.6 V", "70.0", "arx", "90.0",
     ]  # fmt: skip
 
 
