@@ -37,7 +37,8 @@ def _row(dataset: str, found: Sequence[Standing]) -> list[Cell] | None:
     seeds = len({row.seed for row in chosen.rows})
     return [
         Cell(dataset), Cell(f"{len(known)} of {len(found)}"), Cell(chosen.model), Cell(f"{seeds}"),
-        spread_cell(fit, "z.1f", False), Cell(_errors(chosen)), spread_cell(chosen.fit_percent(), "z.1f", chosen.failed),
+        spread_cell(fit, "z.1f", False), Cell(_errors(chosen)),
+        spread_cell(chosen.fit_percent(), "z.1f", chosen.failed),
         Cell(best.model, best=best is chosen), spread_cell(best.fit_percent(), "z.1f", best.failed),
     ]  # fmt: skip
 
