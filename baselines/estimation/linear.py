@@ -192,7 +192,7 @@ def simplest(
 
 
 def free_run_errors(
-    model: Any, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
+    model: Polynomial | StateSpace, experiments: Sequence[Experiment], n_init: int, pieces: int = 10
 ) -> Float[np.ndarray, " K"]:
     """Average mse / variance over the outputs, in `pieces` pieces or more of all experiments; inf if it diverges."""
     spread = np.concatenate([e.y[n_init:] for e in experiments]).var(axis=0)

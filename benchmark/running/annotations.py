@@ -14,10 +14,10 @@ NAMES = {int: "a whole number", float: "a number", bool: "true or false", str: "
 
 
 def hints_of(kind: type) -> dict[str, Any]:
-    """Give the types of a class by attribute; none where a stranger's names something that is not there at run time."""
+    """Give the types of a class by attribute; none where a stranger's annotations cannot be evaluated."""
     try:
         return get_type_hints(kind)
-    except (NameError, TypeError):
+    except Exception:  # prose, or a name that is not there at run time
         return {}
 
 

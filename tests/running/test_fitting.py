@@ -59,6 +59,11 @@ def test_a_parameter_may_be_written_in_any_way_that_its_type_allows(model, param
     check_params(model, params)
 
 
+def test_a_model_whose_annotations_are_prose_runs_unchecked(tmp_path):
+    (tmp_path / "prose.py").write_text('class Prose:\n    level: "any number" = 1.0\n' + "    fit = simulate = print\n")
+    check_params(f"{tmp_path / 'prose.py'}:Prose", {})
+
+
 def test_every_exported_name_exists():
     for name in simgap.__all__:
         assert getattr(simgap, name) is not None
