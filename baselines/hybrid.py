@@ -70,10 +70,7 @@ class Hybrid:
         """Return both, estimated on the training data alone, as networks of filters always are."""
         alone = Hybrid()
         alone.grey = self.grey.as_chosen()
-        alone.rest = Rest(tuple(
-            estimated_again(rest, alone.grey, output) if isinstance(rest, RestOfOutput) else rest
-            for output, rest in enumerate(self.rest.outputs)
-        ))  # fmt: skip
+        alone.rest = estimated_again(self.rest, alone.grey)
         return alone
 
     def grey_and_rest(self) -> tuple[GreyBoxModel, Rest]:

@@ -109,15 +109,18 @@ def learn(model: GreyBoxModel, seed: int) -> Rest:
     return Rest(tuple(outputs[i] for i in sorted(outputs)))
 
 
-def estimated_again(rest: RestOfOutput, model: GreyBoxModel, output: int) -> RestOfOutput:
-    """Estimate the same regression of one output from the training errors of another fit of its model."""
-    y_hat = simulated(model)
-    plant = next(plant for plant in model.plants if output in plant.outputs)
-    rows, e = _spread_rows(plant.records.mask), plant.estimate.errors
-    phi = np.concatenate([block[rows] for block in rest.features.blocks(plant.records.u, y_hat)], axis=1)
-    own = e[..., [plant.outputs.index(output)]]
-    again = _Regressions.fit(phi, own[rows], folds(own, plant.records.mask)[rows])
-    return replace(rest, means=again.means, coefficients=again.coefficients[:, 0].copy())
+def estimated_again(rest: Rest, model: GreyBoxModel) -> Rest:
+    """Estimate the same regressions from the training errors of another fit of the model; other predictors stay."""
+    y_hat, outputs = simulated(model), list(rest.outputs)
+    for plant in model.plants:
+        records, rows = plant.records, _spread_rows(plant.records.mask)
+        for j, output in enumerate(plant.outputs):
+            if isinstance(before := outputs[output], RestOfOutput):
+                e = plant.estimate.errors[..., [j]]
+                phi = _columns(before.features, records.u, y_hat, rows)
+                again = _Regressions.fit(phi, e[rows], folds(e, records.mask)[rows])
+                outputs[output] = replace(before, means=again.means, coefficients=again.coefficients[:, 0].copy())
+    return Rest(tuple(outputs))
 
 
 def simulated(model: GreyBoxModel) -> Float[np.ndarray, "E T ny"]:
@@ -139,8 +142,7 @@ def _learn_plant(plant: FittedPlant, y_hat: np.ndarray, seed: int) -> list[RestO
     tried = []
     for design in DESIGNS:
         features = Features.draw(design, u, y_hat, mask, denominator, seed)
-        phi = np.concatenate([block[rows] for block in features.blocks(u, y_hat)], axis=1)  # [N, f]
-        tried.append((features, _Regressions.fit(phi, e[rows], fold[rows])))
+        tried.append((features, _Regressions.fit(_columns(features, u, y_hat, rows), e[rows], fold[rows])))
     rests: list[RestOfOutput | None] = []
     for j in range(e.shape[2]):
         features, best = min(tried, key=lambda pair: float(pair[1].after[:, j].sum()))
@@ -170,6 +172,12 @@ def folds(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"]) -> Int[
     parts = np.clip(lengths // (MEMORIES * tau), 1, -(-2 * FOLDS // experiments)).astype(int)  # [E]
     part = np.arange(samples) * parts[:, None] // np.maximum(lengths, 1)[:, None]
     return (np.cumsum(parts)[:, None] - parts[:, None] + np.minimum(part, parts[:, None] - 1)) % FOLDS
+
+
+def _columns(
+    features: Features, u: Float[np.ndarray, "E T nu"], y_hat: Float[np.ndarray, "E T ny"], rows: np.ndarray
+) -> Float[np.ndarray, "N f"]:
+    return np.concatenate([block[rows] for block in features.blocks(u, y_hat)], axis=1)
 
 
 def _spread_rows(mask: Bool[np.ndarray, "E T"]) -> Bool[np.ndarray, "E T"]:
