@@ -33,6 +33,8 @@ def stable_spline(length: int, decay: float) -> Float[np.ndarray, "L L"]:
 
 
 DECAYS = 12  # time constants that are tried
+# Of the trace of L' S L: less noise is lost in the rounding of S, where an input has no power at most frequencies.
+LEAST_NOISE = 1e-13
 OPTIONS = {"maxfev": 60, "xatol": 0.03, "fatol": 0.03}
 KERNELS: dict[str, Kernel] = {"tc": tuned_correlated, "ss": stable_spline}
 
@@ -104,7 +106,9 @@ class _Evidence:
         def at(x: np.ndarray) -> tuple:
             s2 = float(power * np.exp(np.clip(x[0], -30, 5)))
             size = np.sqrt(unit * np.exp(np.clip(x[1:], -30, 30)))[which]
-            factor = cholesky(inner * np.outer(size, size) + s2 * np.eye(len(size)), lower=True)
+            scaled = inner * np.outer(size, size)
+            s2 = max(s2, LEAST_NOISE * float(np.trace(scaled)))
+            factor = cholesky(scaled + s2 * np.eye(len(size)), lower=True)
             weights = cho_solve((factor, True), size * right)
             log_det = 2 * np.sum(np.log(np.diag(factor))) - len(size) * np.log(s2)
             minus_log = n * np.log(s2) + log_det + (n * self.power - (size * right) @ weights) / s2

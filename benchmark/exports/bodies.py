@@ -12,17 +12,25 @@ dry_friction = kernel.py_func
 
 
 def move_body(
-    s: list, at: int, new: list, e: list, g0: list, g1: list, n: int, entry: int, fast: int,
+    s: list, at: int, new: list, e: list, g0: list, g1: list, n: int, entry: int, seen: list,
     drive: float, force: float, change: float, hold: float,
 ):  # fmt: skip
-    """Take s[at], s[at + 1], .. to the end of a substep; dry friction holds up to `hold`."""
+    """Take s[at], s[at + 1], .. to the end of a substep; dry friction holds up to `hold`.
+
+    `seen` weighs the states in the velocity.
+    """
     for i in range(n):
         total = g0[i * n + entry] * drive
         for j in range(n):
             total += e[i * n + j] * s[at + j]
         new[i] = total + (g0[i * n + entry] * force + g1[i * n + entry] * change)
     if hold > 0.0:
-        impulse = dry_friction(s[at + fast], new[fast], g0[fast * n + entry] + 1e-300, hold)
+        v, ahead, gain = 0.0, 0.0, 1e-300
+        for i in range(n):
+            v += seen[i] * s[at + i]
+            ahead += seen[i] * new[i]
+            gain += seen[i] * g0[i * n + entry]
+        impulse = dry_friction(v, ahead, gain, hold)
         for i in range(n):
             new[i] += g0[i * n + entry] * impulse
 

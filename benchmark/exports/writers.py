@@ -78,6 +78,7 @@ class PlantWriter:
             transition(a, self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
             given[f"RATES{q}"], given[f"CARRIED{q}"] = -np.diag(a), carried(plant, a)
+            given[f"SEEN{q}"] = plant.seen(self.theta[None])[0, :n]
         return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:
@@ -136,6 +137,8 @@ class PlantWriter:
         n, fast = plant.order, min(1, plant.order - 1)
         entry = ENTRY if plant.joint else n - 1
         x, v, h = f"s[{at}]", f"s[{at + fast}]", repr(self.h)
+        if plant.swings:
+            x = v = "(" + " + ".join(f"SEEN{q}[{i}] * s[{at + i}]" for i in range(n)) + ")"
         pulled = " + ".join(f"CARRIED{q}[{i}] * s[{at + i}]" for i in range(min(n, CARRIED - 1)))
         lines = [f"def {self.name}_substep(s: list, drive: float, begun: int):",
                  '    """Advance the body by a substep, after so many."""',
@@ -144,7 +147,7 @@ class PlantWriter:
         load, damping = f"drive + ({pulled}) - force", f"CARRIED{q}[{CARRIED - 1}] * {v}"
         lines += ["    hold = 0.0", *self.frictions(x, v, h, load, damping)]
         lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
-        lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, {fast}, drive, force, change, hold)")
+        lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, SEEN{q}, drive, force, change, hold)")
         for term, _ in self.forces("stop", x, v, h):
             p = plant.part_of(term).start
             lines.append(f"    stop_body(new, {fast}, {self.of_theta}[{p}], {self.of_theta}[{p + 1}])")

@@ -19,7 +19,7 @@ from simgap.greybox.model import FittedPlant
 from simgap.greybox.outliers import flag
 from simgap.greybox.position_and_velocity import plants_of, with_kind, with_velocity
 from simgap.greybox.problem import Problem
-from simgap.greybox.rivals import of_better_joint, of_better_order
+from simgap.greybox.rivals import of_better_joint, of_better_order, of_several_masses
 from simgap.greybox.samples import Records, excerpts
 from simgap.greybox.selection import Selection, select
 from simgap.records import Channels, TrainingSet
@@ -69,6 +69,8 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             selection = with_inner_filter(selection, of_kind)
             linear = linear_rival(data, of_kind, selection)
+            if linear is not None and (swinging := of_several_masses(linear.baseline, selection, of_kind)):
+                selection, linear = swinging, None
         plant = FittedPlant.fit(*_chosen(selection, linear), experiments)
         identified.append(Identified(selection, plant, settled, linear))
     return identified

@@ -35,7 +35,7 @@ def with_inner_filter(selection: Selection, channels: Channels) -> Selection:
     """
     before, chosen = selection.baseline, selection.trial.estimate
     limits = [term for term in chosen.plant.terms if isinstance(term.effect, InnerSaturation)]
-    if before.plant.kind != "other" or not limits:
+    if not (before.plant.kind == "other" or before.plant.swings) or not limits:
         return selection
     plants = [fit for fit in before.orders or (before.estimate,) if fit.plant.order]
     sections = list(_sections(plants, before))

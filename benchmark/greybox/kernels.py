@@ -25,7 +25,7 @@ FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
 
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
-    _cube, _cube, _cube, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
+    _cube, _cube, _cube, _matrix, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
     types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, types.float64[::1],
     types.float64[:, :, :, ::1],
 )  # fmt: skip
@@ -82,7 +82,7 @@ def dry_friction(v, new, gain, hold):
 
 @directly(_loop)
 def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
-    es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
 
@@ -92,7 +92,8 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
     their role; until[role] counts those of this role and of the ones before. Four states stand in registers; what a
     smaller body lacks of them stays zero, what a larger one has beyond is in `far`. All runs take a substep before the
     next one begins: each has to wait for its own last substep, and the processor works on the others meanwhile. The
-    rates [S, 5] say what the transmission carries, see `simulation.carried`.
+    rates [S, 5] say what the transmission carries, see `simulation.carried`; seen [S, 4] is c of the velocity c z that
+    forces see, in the place of a position too where c begins with 1.
     """
     runs, experiments, samples, n = states.shape
     size = max(n, 4)
@@ -120,11 +121,13 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
             for _ in range(substeps):
                 for s in range(runs):
                     z0, z1, z2, z3 = z[s, 0], z[s, 1], z[s, 2], z[s, 3]
-                    v = z1 if n > 1 else z0
+                    c0, c1, c2, c3 = seen[s, 0], seen[s, 1], seen[s, 2], seen[s, 3]
+                    v = c0 * z0 + c1 * z1 + c2 * z2 + c3 * z3
+                    x = z0 if c0 == 0.0 else v
                     u, p, m = drive[s, experiment, step], pointer(thetas[s]), pointer(held[s])
                     force = 0.0
                     for q in range(until[FORCE]):
-                        force += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
+                        force += terms[q](x, v, step * h, h, p, p_at[q], m, m_at[q])
                     hold = 0.0
                     for q in range(until[FORCE], until[FRICTION]):
                         if m_at[q] < m_at[q + 1]:
@@ -132,7 +135,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                             c = rates[s]
                             held[s, m_at[q]] = u + (c[0] * z0 + c[1] * z1 + c[2] * z2 + c[3] * z3) - force
                             held[s, m_at[q] + 1] = c[4] * v
-                        hold += terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
+                        hold += terms[q](x, v, step * h, h, p, p_at[q], m, m_at[q])
                     rise = force - before[s] if step > 0 else 0.0
                     a, a0, a1, a2, a3 = e[s], g0[s, 0], g0[s, 1], g0[s, 2], g0[s, 3]
                     b0, b1, b2, b3 = g1[s, 0], g1[s, 1], g1[s, 2], g1[s, 3]
@@ -148,9 +151,10 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                         far[i] = g0[s, i] * u + (g0[s, i] * force + g1[s, i] * rise)
                         for j in range(n):
                             far[i] += a[i, j] * z[s, j]
-                    if hold > 0.0:
-                        gain = (a1 if n > 1 else a0) + 1e-300
-                        impulse = dry_friction(v, new1 if n > 1 else new0, gain, hold)
+                    gain = c0 * a0 + c1 * a1 + c2 * a2 + c3 * a3 + 1e-300
+                    if hold > 0.0 and gain > 0.0:  # else the velocity is not of the mass that friction acts on
+                        new = c0 * new0 + c1 * new1 + c2 * new2 + c3 * new3
+                        impulse = dry_friction(v, new, gain, hold)
                         new0 += a0 * impulse
                         new1 += a1 * impulse
                         new2 += a2 * impulse
@@ -172,7 +176,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
 
 @directly(_loop)
 def run_tanks(  # noqa: PLR0912 - as above
-    es, g0s, g1s, rates, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
 ):
     """Fill states [S, E, T, n] of a cascade of tanks, as run_body does; forces act on the first one as inflows."""
     _, experiments, samples, n = states.shape

@@ -44,6 +44,8 @@ class Plant:
 
         x^(n) + .. + a0 x = b u + d + forces,   y = x + c1 x' + ..   (and, for two outputs, y2 = g x')
 
+    Forces see position x and velocity x'; where y is a velocity, they see y.
+
     Cascade of tanks (level): x_i' = inflow - a_i x_i, each tank's outflow the next one's inflow, y = x_n.
 
     A joint (`joint` says which side is measured): two masses of order 4, see `two_masses`; forces act on the motor.
@@ -86,6 +88,9 @@ class Plant:
 
         The conditions of a known machine differ from run to run, and a drift of each run's own would stand for them.
         """
+        if self.swings:
+            # Its order holds every lag, its offset every load; what its transmission carries is not among its states.
+            return not effect.adds_pole and effect.name not in ("constant_load", "sensor_bias", "load_friction")
         if self.machine is None:
             return True
         if not isinstance(effect, InputEffect) or not self.machine.controlled:
@@ -107,6 +112,11 @@ class Plant:
     def imposed(self) -> bool:
         """Whether the first input is a motion and the output the force that it takes, without dynamics."""
         return self.order == 0
+
+    @property
+    def swings(self) -> bool:
+        """Whether the velocity is that of a drive of several masses: forces act where the input does, and see y."""
+        return self.kind == "velocity" and self.order > 1
 
     @property
     def force_order(self) -> int:
@@ -234,7 +244,7 @@ class Plant:
         """Which of theta the states depend on: not what only the readings do."""
         moves = np.ones(self.size, dtype=bool)
         readings = [self.part_of(term) for term in self.terms if term.effect.port == "output"]
-        for part in (self.layout.zeros, self.layout.velocity, *readings):
+        for part in (*([] if self.swings else [self.layout.zeros]), self.layout.velocity, *readings):
             moves[part] = False
         return moves
 
@@ -296,4 +306,13 @@ class Plant:
         c[:, 0, 1 : 1 + self.zeros] = thetas[:, self.layout.zeros]
         if self.two_outputs:
             c[:, 1, at + 1] = thetas[:, self.layout.velocity][:, 0]
+        return c
+
+    def seen(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S 4"]:
+        """Return c of the velocity c z that forces see; it has no more than the states of a body in registers."""
+        c = np.zeros((len(thetas), 4))
+        if self.swings:
+            c[:, : self.order] = self.readings(thetas)[:, 0]
+        else:
+            c[:, min(1, self.order - 1)] = 1.0
         return c

@@ -61,13 +61,12 @@ def _may_lose_sign(baseline: Baseline) -> bool:
 def of_higher_order(selection: Selection, more: int, channels: Channels) -> Baseline | None:
     """Fit the plain model of so many orders more; None where the kind of the output gives the order.
 
-    What moves as more than one mass has no place where the forces of one mass act: its velocity is like any output,
-    and the lags that were found beside one mass are order.
+    The lags that were found beside one mass are order of a drive of several.
     """
     baseline = selection.baseline
     kind, order, records, fit = baseline.plant.kind, baseline.plant.order, baseline.train, baseline.estimate
-    if kind == "velocity":
-        kind, more = "other", more + sum(term.effect.adds_pole for term in selection.trial.terms)
+    if kind == "velocity" and order == 1:
+        more += sum(term.effect.adds_pole for term in selection.trial.terms)
     if kind == "position" or order + more > MAX_ORDER:
         return None
     for larger in range(order + 1, order + more + 1):
@@ -82,6 +81,20 @@ def is_better_order(other: Selection, before: Selection) -> bool:
     was, now = (block_errors(of.trial.estimate, of.baseline.valid, of.baseline.n_init) for of in (before, other))
     as_few = other.trial.cost <= before.trial.cost and now.mean() < was.mean()
     return (as_few or in_most(was - now)) and is_better(other.trial.estimate, other.baseline, before)
+
+
+def of_several_masses(linear: Baseline, before: Selection, channels: Channels) -> Selection | None:
+    """Select the effects on a velocity whose linear model has the order of several masses; None where it needs none.
+
+    The linear model simulates the records better than one mass with effects, and may lack these effects itself.
+    """
+    fit, order = linear.estimate, linear.plant.order
+    if before.baseline.plant.kind != "velocity" or not 1 < order <= MAX_ORDER:
+        return None
+    plain = replace(fit, plant=replace(fit.plant, kind="velocity"))
+    baseline = replace(linear, estimate=scaled(plain, linear.train, channels, linear.outputs))
+    found = select(baseline)
+    return found if found.trial.terms else None
 
 
 def of_better_joint(rigid: Selection, channels: Channels) -> Selection:

@@ -42,7 +42,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             kind=plant.kind, order=plant.force_order, dt=plant.dt, duration=records.duration,
             u_low=float(u.min()), u_high=float(u.max()), u_rms=float(np.sqrt(np.mean(u * u))),
             y_low=float(y.min()), y_high=float(y.max()), y_rms=float(np.std(y)),
-            x_max=x_max, v_max=v_max, stroke=x_max if plant.order != 1 else _stroke(x, v_max, records),
+            x_max=x_max, v_max=v_max, stroke=_stroke(x, v_max, records) if plant.order == 1 or plant.swings else x_max,
             force_rms=force,
             u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
             lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),

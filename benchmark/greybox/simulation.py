@@ -134,7 +134,7 @@ class Simulator:
             return states
         run = run_tanks if plant.cascade else run_body
         run(
-            e, g0, g1, rates, entry, drives, starts, self.substeps, self.h, self._terms,
+            e, g0, g1, rates, plant.seen(thetas), entry, drives, starts, self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
@@ -183,6 +183,9 @@ class Simulator:
         if self.plant.imposed:
             return self.drive.motion(theta, local)
         states = self.states(theta[None], local[None, :, : self.plant.n_moving])[0]
+        if self.plant.swings:
+            v = states @ self.plant.seen(theta[None])[0, : self.plant.order]
+            return v, v
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
     def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:

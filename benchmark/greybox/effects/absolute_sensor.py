@@ -25,7 +25,7 @@ class AbsoluteSensor(OutputEffect):
     reference: ClassVar[str] = "Wigren and Schoukens, Coupled electric drives, Uppsala University TR 2017-024"
     visible_in_readings: ClassVar[bool] = True
     moves_poles: ClassVar[bool] = True
-    place_in_chain: ClassVar[int] = 120
+    place_in_chain: ClassVar[int] = 105
     hides_sign: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "position", "value", "level")
     confounders: ClassVar[dict[str, str]] = {
