@@ -13,6 +13,7 @@ DT = 0.1
 PLANTS = {
     "velocity": ("velocity", 1, {}, [0.8, 1.5]),
     "position": ("position", 2, {}, [1.1, 4.0, 6.0]),
+    "several masses": ("velocity", 3, {"offset": True, "zeros": 2}, [0.8, 90.0, 0.9, 60.0, 0.5, 0.01, 0.016]),
     "smooth input": ("position", 2, {"taps": (0, -1, 1), "zeros": 1}, [1.1, 4.0, 3.0, 1.0, 2.0, 0.02]),
     "two outputs": ("position", 2, {"two_outputs": True}, [1.1, 4.0, 6.0, 0.9]),
     "two masses": ("position", 4, {"joint": "load"}, [0.9, 1.0, 60.0, 80.0, 0.01, 6.0]),

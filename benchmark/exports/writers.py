@@ -147,7 +147,9 @@ class PlantWriter:
         load, damping = f"drive + ({pulled}) - force", f"CARRIED{q}[{CARRIED - 1}] * {v}"
         lines += ["    hold = 0.0", *self.frictions(x, v, h, load, damping)]
         lines.append(f"    change = force - s[{self.before}] if begun > 0 else 0.0")
-        lines.append(f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, SEEN{q}, drive, force, change, hold)")
+        lines.append(
+            f"    move_body(s, {at}, new, E{q}, G{q}, R{q}, {n}, {entry}, SEEN{q}, drive, force, change, hold)"
+        )
         for term, _ in self.forces("stop", x, v, h):
             p = plant.part_of(term).start
             lines.append(f"    stop_body(new, {fast}, {self.of_theta}[{p}], {self.of_theta}[{p + 1}])")

@@ -55,7 +55,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     with_effects, without, of_linear = (
-        block_errors(fit, plain.valid, data.n_init) for fit in (chosen, plain.estimate, linear.estimate)
+        block_errors(fit, plain.valid, data.n_init, plain.train) for fit in (chosen, plain.estimate, linear.estimate)
     )
     gain = with_effects - of_linear
     # What the readings show needs no better simulation.

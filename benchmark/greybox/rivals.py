@@ -1,4 +1,4 @@
-"""Other plants than the one that the effects were selected on: of a higher order, or with a flexible joint."""
+"""Other plants than the one that the effects were selected on: of a higher order, or of several masses."""
 
 from __future__ import annotations
 
@@ -86,15 +86,23 @@ def is_better_order(other: Selection, before: Selection) -> bool:
 def of_several_masses(linear: Baseline, before: Selection, channels: Channels) -> Selection | None:
     """Select the effects on a velocity whose linear model has the order of several masses; None where it needs none.
 
-    The linear model simulates the records better than one mass with effects, and may lack these effects itself.
+    The linear model simulates the records better than one mass with effects, and may lack these effects itself. Where
+    its order is too high for them, they are selected on the best one below, and must then do better than it does.
     """
-    fit, order = linear.estimate, linear.plant.order
-    if before.baseline.plant.kind != "velocity" or not 1 < order <= MAX_ORDER:
+
+    def left(fit: Estimate) -> np.ndarray:
+        return block_errors(fit, linear.valid, linear.n_init, linear.train)
+
+    plants = [fit for fit in (linear.estimate, *linear.orders) if 1 < fit.plant.order <= MAX_ORDER]
+    if before.baseline.plant.kind != "velocity" or not plants:
         return None
+    fit = linear.estimate if linear.estimate in plants else min(plants, key=lambda fit: left(fit).mean())
     plain = replace(fit, plant=replace(fit.plant, kind="velocity"))
-    baseline = replace(linear, estimate=scaled(plain, linear.train, channels, linear.outputs))
-    found = select(baseline)
-    return found if found.trial.terms else None
+    found = select(replace(linear, estimate=scaled(plain, linear.train, channels, linear.outputs)))
+    chosen = found.trial.estimate
+    better = score_gain(found.baseline, chosen, linear, linear.estimate) > BETTER
+    better = better and not in_most(left(chosen) - left(linear.estimate))
+    return found if found.trial.terms and better else None
 
 
 def of_better_joint(rigid: Selection, channels: Channels) -> Selection:
