@@ -41,15 +41,36 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
             more = 2  # a resonance takes two
         else:
             break
+    baseline = selection.baseline
+    if baseline.plant.kind == "velocity" and _may_lose_sign(baseline) and _leaves_much(selection):
+        other = select(_with_zeros(baseline, channels))
+        return other if is_better_order(other, selection) else selection
     return selection
+
+
+def _leaves_much(selection: Selection) -> bool:
+    """Tell whether the input still predicts much of the error."""
+    chosen, baseline = selection.trial.estimate, selection.baseline
+    return look_for_more(chosen, baseline.train).share * chosen.squares > UNEXPLAINED * baseline.estimate.squares
+
+
+def _with_zeros(baseline: Baseline, channels: Channels) -> Baseline:
+    """Fit the plain model of the highest order with all its zeros, as others swing beside the mass that is measured.
+
+    The signs that the readings have lost are found with it where they are not with fewer poles and none of the zeros.
+    """
+    fit = baseline.estimate
+    for order in range(1, MAX_ORDER + 1):
+        plant = Plant("velocity", order, baseline.plant.nu, baseline.plant.dt, zeros=order - 1, offset=True)
+        fit = fit_plain(plant, baseline.train, fit if order > 2 else None)
+    return replace(baseline, estimate=scaled(fit, baseline.train, channels, baseline.outputs))
 
 
 def _asks_for_order(selection: Selection) -> bool:
     """Tell whether a lag may be missing beside effects, or a second mass where one leaves much of a velocity open."""
-    baseline, chosen = selection.baseline, selection.trial.estimate
+    baseline = selection.baseline
     if baseline.plant.kind == "velocity" and not _may_lose_sign(baseline):
-        left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.estimate.squares
-        return left > UNEXPLAINED
+        return _leaves_much(selection)
     return _may_lose_sign(baseline) or any(not term.effect.linear for term in selection.trial.terms)
 
 

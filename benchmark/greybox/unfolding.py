@@ -61,5 +61,5 @@ def _of_inputs(records: Records) -> Iterator[Float[np.ndarray, "E T 1"]]:
 def _rungs(plant: Plant) -> Iterator[Plant]:
     """Yield plants of rising order, the given one at last; where its kind gives the order, that one alone."""
     for order in range(1, plant.order if plant.kind in ("velocity", "other") else 1):
-        yield Plant(plant.kind, order, plant.nu, plant.dt, offset=True)
+        yield Plant(plant.kind, order, plant.nu, plant.dt, zeros=order - 1 if plant.zeros else 0, offset=True)
     yield plant
