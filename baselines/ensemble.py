@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import nnls
 
-from simgap.metrics import free_run_nrmse
+from simgap.metrics import spread
 from simgap.protocol import as_chosen, is_stochastic
-from simgap.records import TrainingSet, UnusableInput
+from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
 
@@ -21,10 +22,11 @@ from simgap.registry import MODELS
 class Ensemble:
     """The mean of the simulations of several models; one that is named twice is fitted twice, with other seeds.
 
-    y_hat = sum_i w_i y_hat_i, w_i ~ 1 / mse_i, sum_i w_i = 1, with the mean squared error of each free run over the
-    validation data before these are estimated on (Bates and Granger 1969). Errors that members do not share cancel:
-    those of physics and of networks, those of two starts of one network. epochs, batches: of the networks among them,
-    shorter than alone, as they are many; 0 for what they do alone. Raises UnusableInput.
+    y_hat = sum_i w_i y_hat_i, w_i >= 0, sum_i w_i = 1, by free runs over the validation data before these are estimated
+    on. The seeds of one model share its bias: within a model w_i ~ 1 / mse_i (Bates and Granger 1969); the shares of
+    the models have the least squared error (Breiman, Stacked regressions, 1996). Errors that models do not share
+    cancel: those of physics and of networks, those of two starts of one network. epochs, batches: of the networks among
+    them, shorter than alone, as they are many; 0 for what they do alone. Raises UnusableInput.
     """
 
     quick: ClassVar = {"models": ("arx", "gru"), "epochs": 6, "batches": 20}
@@ -42,14 +44,13 @@ class Ensemble:
         self.members = [MODELS[name](**self._params(name)) for name in self.models]
         for number, member in enumerate(self.members):
             member.fit(data, len(self.members) * seed + number)
-        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
         self._chosen = copy.copy(self)
         self._chosen.members = [as_chosen(member) for member in self.members]
-        errors = np.array([free_run_nrmse(one.simulate, held_out, data.n_init) ** 2 for one in self._chosen.members])
-        if not np.isfinite(errors).any():
-            raise UnusableInput("no member of the ensemble simulates the validation data")
-        worth = 1 / np.maximum(errors, 1e-30)
-        self.weights = self._chosen.weights = worth / worth.sum()
+        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        target = np.concatenate([x.y[data.n_init :] for x in held_out])
+        size = np.array([spread(y) or 1.0 for y in target.T])
+        runs = np.array([_free_runs(member, held_out, data.n_init) for member in self._chosen.members])
+        self.weights = self._chosen.weights = stacked(self.models, runs / size, target / size)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -80,3 +81,27 @@ class Ensemble:
     def fitted(self) -> dict[str, Any]:
         """The weight of each member, in the order of their fits."""
         return {"weights": self.weights.tolist()}
+
+
+def _free_runs(model: Any, experiments: Sequence[Experiment], n_init: int) -> Float[np.ndarray, "N ny"]:
+    return np.concatenate([model.simulate(x.u[None], x.y[None, :n_init])[0] for x in experiments])
+
+
+def stacked(
+    models: Sequence[str], runs: Float[np.ndarray, "M N ny"], target: Float[np.ndarray, "N ny"]
+) -> Float[np.ndarray, " M"]:
+    """Weigh free runs of models, some of which have several; raises UnusableInput where all of them diverge."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors = np.square(runs - target).mean(axis=(1, 2))
+    finite = np.isfinite(errors)
+    if not finite.any():
+        raise UnusableInput("no member of the ensemble simulates the validation data")
+    worth = np.where(finite, 1 / np.maximum(errors, 1e-30), 0.0)
+    named = np.array([[name == model for name in models] for model in dict.fromkeys(models)]) & finite  # [K, M]
+    within = named[named.any(axis=1)] * worth
+    within /= within.sum(axis=1, keepdims=True)
+    means = np.tensordot(within, np.where(finite[:, None, None], runs, 0.0), 1).reshape(len(within), -1)
+    # Of sum w = 1 and the least squares, the first holds to a millionth, and then exactly.
+    much = 1e3 * (np.abs(means).max() or 1.0) * np.sqrt(target.size)
+    shares, _ = nnls(np.vstack((means.T, np.full(len(within), much))), np.append(target.ravel(), much))
+    return shares / shares.sum() @ within

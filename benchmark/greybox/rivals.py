@@ -20,7 +20,7 @@ from simgap.greybox.trial import MATTERS, score_gain
 from simgap.records import Channels
 
 MAX_ORDER = 4  # with effects: every order is another search
-UNEXPLAINED = 0.05  # of the plain model's squared error: more that the input still predicts
+UNEXPLAINED = 0.05  # of the plain model's squared error: more that is left, or that the input still predicts
 
 
 def of_better_order(selection: Selection, channels: Channels) -> Selection:
@@ -41,17 +41,12 @@ def of_better_order(selection: Selection, channels: Channels) -> Selection:
             more = 2  # a resonance takes two
         else:
             break
-    baseline = selection.baseline
-    if baseline.plant.kind == "velocity" and _may_lose_sign(baseline) and _leaves_much(selection):
+    baseline, left = selection.baseline, selection.trial.estimate.squares
+    folded = baseline.plant.kind == "velocity" and _may_lose_sign(baseline)
+    if folded and left > UNEXPLAINED * baseline.estimate.squares:
         other = select(_with_zeros(baseline, channels))
         return other if is_better_order(other, selection) else selection
     return selection
-
-
-def _leaves_much(selection: Selection) -> bool:
-    """Tell whether the input still predicts much of the error."""
-    chosen, baseline = selection.trial.estimate, selection.baseline
-    return look_for_more(chosen, baseline.train).share * chosen.squares > UNEXPLAINED * baseline.estimate.squares
 
 
 def _with_zeros(baseline: Baseline, channels: Channels) -> Baseline:
@@ -68,9 +63,10 @@ def _with_zeros(baseline: Baseline, channels: Channels) -> Baseline:
 
 def _asks_for_order(selection: Selection) -> bool:
     """Tell whether a lag may be missing beside effects, or a second mass where one leaves much of a velocity open."""
-    baseline = selection.baseline
+    baseline, chosen = selection.baseline, selection.trial.estimate
     if baseline.plant.kind == "velocity" and not _may_lose_sign(baseline):
-        return _leaves_much(selection)
+        left = look_for_more(chosen, baseline.train).share * chosen.squares / baseline.estimate.squares
+        return left > UNEXPLAINED
     return _may_lose_sign(baseline) or any(not term.effect.linear for term in selection.trial.terms)
 
 
