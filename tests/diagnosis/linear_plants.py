@@ -3,7 +3,7 @@
 One to four poles over two decades, swinging or not, side by side with weights of either sign, so that zeros lie
 anywhere; steps of random heights and lengths. Seeded.
 
-python tests/diagnosis/linear_plants.py FIRST LAST          the plants of these seeds
+python tests/diagnosis/linear_plants.py FIRST LAST KIND     the plants of these seeds, said to be of that kind
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
 from simgap.diagnosis.diagnose import diagnose
-from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
+from simgap.records import Channel, Channels, Dataset, Experiment, Kind, TrainingSet
 
 DT = 0.1  # s
 NOISE = 0.02  # of the output's spread
@@ -43,7 +43,7 @@ def steps(rng: np.random.Generator, samples: int, hold: float) -> np.ndarray:
     return np.repeat(rng.uniform(-1, 1, samples), lengths)[:samples]
 
 
-def data_set(seed: int) -> Dataset:
+def data_set(seed: int, kind: Kind = "other") -> Dataset:
     """Two records to train with, one to validate and one to test."""
     rng = np.random.default_rng(seed)
     samples = int(rng.choice([400, 800, 1500]))
@@ -58,16 +58,17 @@ def data_set(seed: int) -> Dataset:
             x = a @ x + b[:, 0] * inputs[k]
     y += NOISE * y.std() * rng.standard_normal(y.shape)
     made = tuple(Experiment(f"e{i}", u[i, :, None], y[i, :, None], DT) for i in range(4))
-    channels = Channels((Channel("u"),), (Channel("y", kind="other", kind_from="written"),))
+    channels = Channels((Channel("u"),), (Channel("y", kind=kind, kind_from="written"),))
     training = TrainingSet(made[:2], made[2:3], 10, channels)
     return Dataset(f"linear-{seed}", training, made[3:], 10, channels)
 
 
 def main() -> None:
     """Print what is said of each plant."""
-    for seed in range(int(sys.argv[1]), int(sys.argv[2])):
+    first, last, *kind = sys.argv[1:]
+    for seed in range(int(first), int(last)):
         begun = time.perf_counter()
-        found = diagnose(data_set(seed)).findings
+        found = diagnose(data_set(seed, *kind)).findings
         named, suspected = ([cause.effect for cause in causes] for causes in (found.causes, found.suspects))
         fit = found.baseline["fit_percent"]["y"]
         print(seed, found.verdict, named, suspected, f"fit {fit:.1f} % {time.perf_counter() - begun:.1f} s", flush=True)

@@ -11,7 +11,8 @@ STUDY = runpy.run_path(str(Path(__file__).with_name("linear_plants.py")))
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["other", "velocity"])
 @pytest.mark.parametrize("seed", range(8))
-def test_of_a_linear_plant_nothing_is_named(seed):
-    found = diagnose(STUDY["data_set"](seed)).findings
+def test_of_a_linear_plant_nothing_is_named(seed, kind):
+    found = diagnose(STUDY["data_set"](seed, kind)).findings
     assert not found.causes
