@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from parameters_of_effects import scales
 
+from simgap.data.loading import load
 from simgap.data.splits import assemble
 from simgap.greybox.effects.coulomb_friction import CoulombFriction
 from simgap.greybox.identification import identify
@@ -77,3 +78,9 @@ def test_friction_of_a_drive_with_a_load_behind_a_shaft_is_named(seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_nothing_is_named_where_such_a_drive_has_no_friction(seed):
     assert effects_of(drive(seed, 0.0))[1] == []
+
+
+def test_the_friction_of_the_coupled_drives_is_found_behind_a_sensor_that_loses_the_sign(measured):
+    order, effects = effects_of(load("ced"))
+    assert order == 3
+    assert {"absolute_sensor", "curved_sensor", "coulomb_friction"} <= set(effects)
