@@ -33,8 +33,10 @@ class Informed:
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Find or fit the effects, simulate what they do, and fit the other model with that as inputs."""
-        self.grey = GreyBoxAuto() if self.effects is None else GreyBox(self.effects)
-        self.grey.fit(data, seed)
+        grey = GreyBoxAuto() if self.effects is None else GreyBox(self.effects)
+        grey.fit(data, seed)
+        # Estimated on validation data too, it would make the other model trust it more than a test will.
+        self.grey = grey.as_chosen()
         n = data.n_init
 
         def with_effects(x: Experiment) -> Experiment:
@@ -61,9 +63,9 @@ class Informed:
         return np.concatenate(columns, axis=2)
 
     def as_chosen(self) -> Informed:
-        """Return both models as validation data chose them."""
+        """Return the same grey box, with the other model as validation data chose it."""
         chosen = copy.copy(self)
-        chosen.grey, chosen.model = self.grey.as_chosen(), as_chosen(self.model)
+        chosen.model = as_chosen(self.model)
         return chosen
 
     @property
