@@ -33,10 +33,16 @@ class Informed:
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Find or fit the effects, simulate what they do, and fit the other model with that as inputs."""
-        grey = GreyBoxAuto() if self.effects is None else GreyBox(self.effects)
-        grey.fit(data, seed)
-        # Estimated on validation data too, it would make the other model trust it more than a test will.
-        self.grey = grey.as_chosen()
+        self.grey = GreyBoxAuto() if self.effects is None else GreyBox(self.effects)
+        self.grey.fit(data, seed)
+        self.model = self._beside_effects(data, seed)
+        # Were what effects do to validation data estimated on these, the other model would trust it too much.
+        self._chosen = copy.copy(self)
+        self._chosen.grey = self.grey.as_chosen()
+        self._chosen.model = as_chosen(self._chosen._beside_effects(data, seed))
+
+    def _beside_effects(self, data: TrainingSet, seed: int) -> Any:
+        """Fit the other model to the data with what the effects do as inputs."""
         n = data.n_init
 
         def with_effects(x: Experiment) -> Experiment:
@@ -46,8 +52,9 @@ class Informed:
         added = tuple(Channel(f"effect{i}") for i in range(train[0].u.shape[1] - data.train[0].u.shape[1]))
         channels = Channels(data.channels.inputs + added, data.channels.outputs)
         valid = tuple(with_effects(x) for x in data.valid if len(x) > n)
-        self.model = MODELS[self.inner]()
-        self.model.fit(replace(data, train=train, valid=valid, channels=channels), seed)
+        model = MODELS[self.inner]()
+        model.fit(replace(data, train=train, valid=valid, channels=channels), seed)
+        return model
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -63,10 +70,8 @@ class Informed:
         return np.concatenate(columns, axis=2)
 
     def as_chosen(self) -> Informed:
-        """Return the same grey box, with the other model as validation data chose it."""
-        chosen = copy.copy(self)
-        chosen.model = as_chosen(self.model)
-        return chosen
+        """Return both models as validation data chose them."""
+        return self._chosen
 
     @property
     def stochastic(self) -> bool:

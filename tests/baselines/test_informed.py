@@ -14,12 +14,12 @@ def informed_by(data):
     return model
 
 
-def test_what_effects_do_is_not_estimated_on_validation_data():
+def test_the_model_as_chosen_is_not_estimated_on_validation_data():
     data = hide("stage", {"coulomb_friction": 1.0}, seed=3)
     training, (x, *_) = data.training, data.test
     u, y_init = x.u[None], x.y[None, : data.n_init]
     once, twice = informed_by(training), informed_by(replace(training, valid=2 * training.valid))
-    np.testing.assert_array_equal(once.grey.simulate(u, y_init), twice.grey.simulate(u, y_init))
+    np.testing.assert_array_equal(once.as_chosen().simulate(u, y_init), twice.as_chosen().simulate(u, y_init))
 
 
 def test_friction_that_is_simulated_beside_a_linear_model_halves_its_error():
