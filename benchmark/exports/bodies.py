@@ -30,9 +30,10 @@ def move_body(
             v += seen[i] * s[at + i]
             ahead += seen[i] * new[i]
             gain += seen[i] * g0[i * n + entry]
-        impulse = dry_friction(v, ahead, gain, hold)
-        for i in range(n):
-            new[i] += g0[i * n + entry] * impulse
+        if gain > 0.0:
+            impulse = dry_friction(v, ahead, gain, hold)
+            for i in range(n):
+                new[i] += g0[i * n + entry] * impulse
 
 
 def stop_body(new: list, fast: int, low: float, high: float):

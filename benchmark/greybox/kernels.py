@@ -93,10 +93,10 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
     smaller body lacks of them stays zero, what a larger one has beyond is in `far`. All runs take a substep before the
     next one begins: each has to wait for its own last substep, and the processor works on the others meanwhile. The
     rates [S, 5] say what the transmission carries, see `simulation.carried`; seen [S, 4] is c of the velocity c z that
-    forces see, in the place of a position too where c begins with 1.
+    forces see, in the place of a position too where that is no single state.
     """
     runs, experiments, samples, n = states.shape
-    size = max(n, 4)
+    size, mixed = max(n, 4), n > 1 and seen[0, 0] != 0.0
     e, g0, g1, far = np.zeros((runs, size, size)), np.zeros((runs, size)), np.zeros((runs, size)), np.zeros(size)
     z, held, before = np.zeros((runs, size)), np.zeros((runs, len(memory))), np.zeros(runs)
     for s in range(runs):
@@ -121,9 +121,9 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
             for _ in range(substeps):
                 for s in range(runs):
                     z0, z1, z2, z3 = z[s, 0], z[s, 1], z[s, 2], z[s, 3]
-                    c0, c1, c2, c3 = seen[s, 0], seen[s, 1], seen[s, 2], seen[s, 3]
-                    v = c0 * z0 + c1 * z1 + c2 * z2 + c3 * z3
-                    x = z0 if c0 == 0.0 else v
+                    x, v = z0, z1 if n > 1 else z0
+                    if mixed:
+                        x = v = seen[s, 0] * z0 + seen[s, 1] * z1 + seen[s, 2] * z2 + seen[s, 3] * z3
                     u, p, m = drive[s, experiment, step], pointer(thetas[s]), pointer(held[s])
                     force = 0.0
                     for q in range(until[FORCE]):
@@ -151,10 +151,13 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                         far[i] = g0[s, i] * u + (g0[s, i] * force + g1[s, i] * rise)
                         for j in range(n):
                             far[i] += a[i, j] * z[s, j]
-                    gain = c0 * a0 + c1 * a1 + c2 * a2 + c3 * a3 + 1e-300
-                    if hold > 0.0 and gain > 0.0:  # else the velocity is not of the mass that friction acts on
-                        new = c0 * new0 + c1 * new1 + c2 * new2 + c3 * new3
-                        impulse = dry_friction(v, new, gain, hold)
+                    if hold > 0.0:
+                        gain, new = (a1, new1) if n > 1 else (a0, new0)
+                        if mixed:
+                            gain = seen[s, 0] * a0 + seen[s, 1] * a1 + seen[s, 2] * a2 + seen[s, 3] * a3
+                            new = seen[s, 0] * new0 + seen[s, 1] * new1 + seen[s, 2] * new2 + seen[s, 3] * new3
+                        # A negative gain is not that of the mass whose velocity is measured.
+                        impulse = 0.0 if mixed and gain < 0.0 else dry_friction(v, new, gain + 1e-300, hold)
                         new0 += a0 * impulse
                         new1 += a1 * impulse
                         new2 += a2 * impulse
