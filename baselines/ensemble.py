@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from simgap.metrics import spread
+from simgap.metrics import free_runs
 from simgap.protocol import as_chosen, is_stochastic
-from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
 
@@ -46,11 +46,10 @@ class Ensemble:
             member.fit(data, len(self.members) * seed + number)
         self._chosen = copy.copy(self)
         self._chosen.members = [as_chosen(member) for member in self.members]
-        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
-        target = np.concatenate([x.y[data.n_init :] for x in held_out])
-        size = np.array([spread(y) or 1.0 for y in target.T])
-        runs = np.array([_free_runs(member, held_out, data.n_init) for member in self._chosen.members])
-        self.weights = self._chosen.weights = stacked(self.models, runs / size, target / size)
+        held_out = data.valid or data.train
+        runs = [free_runs(member.simulate, held_out, data.n_init) for member in self._chosen.members]
+        simulated, measured = np.array([one for one, _ in runs]), runs[0][1]
+        self.weights = self._chosen.weights = stacked(self.models, simulated, measured)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -81,10 +80,6 @@ class Ensemble:
     def fitted(self) -> dict[str, Any]:
         """The weight of each member, in the order of their fits."""
         return {"weights": self.weights.tolist()}
-
-
-def _free_runs(model: Any, experiments: Sequence[Experiment], n_init: int) -> Float[np.ndarray, "N ny"]:
-    return np.concatenate([model.simulate(x.u[None], x.y[None, :n_init])[0] for x in experiments])
 
 
 def stacked(

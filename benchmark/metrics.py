@@ -53,15 +53,26 @@ def failed_metrics(channels: Channels) -> dict[str, dict[str, Any]]:
     return {c.name: infinite | {"mse": math.inf, "mae": math.inf, "n_scored": 0} for c in channels.outputs}
 
 
+def free_runs(
+    simulate: Callable[..., np.ndarray], experiments: Sequence[Experiment], n_init: int
+) -> tuple[Float[np.ndarray, "N ny"], Float[np.ndarray, "N ny"]]:
+    """Return simulated and measured outputs, over their sizes, after the first n_init samples of all experiments.
+
+    The size of an output is its spread over all of them; experiments that are no longer than n_init are left out.
+    """
+    longer = [x for x in experiments if len(x) > n_init]
+    measured = np.concatenate([x.y[n_init:] for x in longer])
+    size = np.array([spread(of_output) or 1.0 for of_output in measured.T])
+    with np.errstate(over="ignore", invalid="ignore"):
+        simulated = np.concatenate([simulate(x.u[None], x.y[None, :n_init])[0] for x in longer])
+        return simulated / size, measured / size
+
+
 def free_run_nrmse(simulate: Callable[..., np.ndarray], experiments: Sequence[Experiment], n_init: int) -> float:
     """sqrt(mean over the outputs of mse / variance) of free runs from n_init measured samples; inf if one diverges."""
-    longer = [x for x in experiments if len(x) > n_init]
-    scored = np.concatenate([x.y[n_init:] for x in longer])
+    simulated, measured = free_runs(simulate, experiments, n_init)
     with np.errstate(over="ignore", invalid="ignore"):
-        errors = [simulate(x.u[None], x.y[None, :n_init])[0] - x.y[n_init:] for x in longer]
-        mse = np.square(np.concatenate(errors)).mean(axis=0)  # [ny]
-    size = np.array([spread(of_output) or 1.0 for of_output in scored.T])
-    nrmse = float(np.sqrt(np.mean(mse / size**2)))
+        nrmse = float(np.sqrt(np.mean(np.square(simulated - measured))))
     return nrmse if np.isfinite(nrmse) else math.inf
 
 

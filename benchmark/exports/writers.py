@@ -13,7 +13,7 @@ from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
-from simgap.greybox.simulation import CARRIED, carried
+from simgap.greybox.simulation import CARRIED, carried, seen
 from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
@@ -78,7 +78,7 @@ class PlantWriter:
             transition(a, self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
             given[f"RATES{q}"], given[f"CARRIED{q}"] = -np.diag(a), carried(plant, a)
-            given[f"SEEN{q}"] = plant.seen(self.theta[None])[0, :n]
+            given[f"SEEN{q}"] = seen(plant, self.theta[None])[0, :n]
         return {name: np.ascontiguousarray(value).ravel() for name, value in given.items()}
 
     def start(self, u: Float[np.ndarray, "T nu"], y_init: Float[np.ndarray, "n ny"], state: np.ndarray) -> None:

@@ -307,12 +307,3 @@ class Plant:
         if self.two_outputs:
             c[:, 1, at + 1] = thetas[:, self.layout.velocity][:, 0]
         return c
-
-    def seen(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S 4"]:
-        """Return c of the velocity c z that forces see; it has no more than the states of a body in registers."""
-        c = np.zeros((len(thetas), 4))
-        if self.swings:
-            c[:, : self.order] = self.readings(thetas)[:, 0]
-        else:
-            c[:, min(1, self.order - 1)] = 1.0
-        return c

@@ -54,11 +54,18 @@ def _with_zeros(baseline: Baseline, channels: Channels) -> Baseline:
 
     The signs that the readings have lost are found with it where they are not with fewer poles and none of the zeros.
     """
-    fit = baseline.estimate
-    for order in range(1, MAX_ORDER + 1):
-        plant = Plant("velocity", order, baseline.plant.nu, baseline.plant.dt, zeros=order - 1, offset=True)
-        fit = fit_plain(plant, baseline.train, fit if order > 2 else None)
+    fit = _grown(baseline, range(1, MAX_ORDER + 1), with_zeros=True)
     return replace(baseline, estimate=scaled(fit, baseline.train, channels, baseline.outputs))
+
+
+def _grown(baseline: Baseline, orders: range, with_zeros: bool) -> Estimate:
+    """Fit plain models of rising order, each from the poles of the one before; return the last."""
+    fit = baseline.estimate
+    for order in orders:
+        zeros = order - 1 if with_zeros else 0
+        plant = Plant(baseline.plant.kind, order, baseline.plant.nu, baseline.plant.dt, zeros=zeros, offset=True)
+        fit = fit_plain(plant, baseline.train, fit if order > 2 else None)
+    return fit
 
 
 def _asks_for_order(selection: Selection) -> bool:
@@ -81,14 +88,12 @@ def of_higher_order(selection: Selection, more: int, channels: Channels) -> Base
     The lags that were found beside one mass are order of a drive of several.
     """
     baseline = selection.baseline
-    kind, order, records, fit = baseline.plant.kind, baseline.plant.order, baseline.train, baseline.estimate
+    kind, order, records = baseline.plant.kind, baseline.plant.order, baseline.train
     if kind == "velocity" and order == 1:
         more += sum(term.effect.adds_pole for term in selection.trial.terms)
     if kind == "position" or order + more > MAX_ORDER:
         return None
-    for larger in range(order + 1, order + more + 1):
-        plant = Plant(kind, larger, baseline.plant.nu, records.dt, offset=True)
-        fit = fit_plain(plant, records, fit if larger > 2 else None)
+    fit = _grown(baseline, range(order + 1, order + more + 1), with_zeros=False)
     fit = first_order_hold(fit, records, baseline.valid, baseline.n_init) or fit
     return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
 

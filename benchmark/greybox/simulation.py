@@ -62,6 +62,16 @@ def carried(plant: Plant, a: Float[np.ndarray, "n n"]) -> Float[np.ndarray, " 5"
     return c
 
 
+def seen(plant: Plant, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S 4"]:
+    """Return c of the velocity c z that forces see; it has no more than the states of a body in registers."""
+    c = np.zeros((len(thetas), 4))
+    if plant.swings:
+        c[:, : plant.order] = plant.readings(thetas)[:, 0]
+    else:
+        c[:, min(1, plant.order - 1)] = 1.0
+    return c
+
+
 def distinct(values: Float[np.ndarray, "S k"]) -> tuple[np.ndarray, np.ndarray]:
     """List the first row and those that differ from it, and where in this list each row finds its own.
 
@@ -134,7 +144,7 @@ class Simulator:
             return states
         run = run_tanks if plant.cascade else run_body
         run(
-            e, g0, g1, rates, plant.seen(thetas), entry, drives, starts, self.substeps, self.h, self._terms,
+            e, g0, g1, rates, seen(plant, thetas), entry, drives, starts, self.substeps, self.h, self._terms,
             self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
         )  # fmt: skip
         return states
@@ -184,7 +194,7 @@ class Simulator:
             return self.drive.motion(theta, local)
         states = self.states(theta[None], local[None, :, : self.plant.n_moving])[0]
         if self.plant.swings:
-            v = states @ self.plant.seen(theta[None])[0, : self.plant.order]
+            v = states @ seen(self.plant, theta[None])[0, : self.plant.order]
             return v, v
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
