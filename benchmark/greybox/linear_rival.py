@@ -14,7 +14,7 @@ from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import CONSISTENT, halves_speak_for, score_gain
+from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, halves_speak_for, score_gain
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -42,8 +42,9 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
 
     What is nonlinear must score higher than that, and err no more in most held-out blocks; or leave less than half of
     what the linear model leaves of records that neither was fitted to: no order has such a stand-in. A lag or a delay
-    is a linear model itself, of few parameters, and is believed as long as more of them hardly help. None too where
-    effects are of single experiments and cannot be forecast. The orders of an output that is no motion and no level
+    is a linear model itself, of few parameters, and is believed as long as more of them hardly help, be it beside what
+    the lag takes of the error or beside what it leaves. None too where effects are of single experiments and cannot be
+    forecast. The orders of an output that is no motion and no level
     have been tried already; see `_of_tried_order`.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
@@ -62,8 +63,9 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
         error = gain.std() / math.sqrt(len(gain))
         better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
-        better = better and gain.mean() > BEYOND * (without.mean() - with_effects.mean())
-        return LinearRival.of(linear, gain) if better else None
+        beside_taken = gain.mean() > BEYOND * (without.mean() - with_effects.mean())
+        beside_left = of_linear.mean() < HALVES_LEAVE * with_effects.mean()
+        return LinearRival.of(linear, gain) if better and (beside_taken or beside_left) else None
     beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
     if beaten or halves_speak_for(plain, chosen, linear.estimate):
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -79,6 +80,12 @@ def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
     return torch.optim.Adam([g for g in groups if g["params"]], lr=recipe.learning_rate, fused=True)
 
 
+def exact_on_a_gpu() -> AbstractContextManager[None]:
+    """Let cuDNN compute in single precision, as a CPU does, not in TF32; and the same each time from the same seed."""
+    return torch.backends.cudnn.flags(enabled=True, deterministic=True, allow_tf32=False)
+
+
+@exact_on_a_gpu()
 def train(
     net: Block, examples: Examples, held_out: Examples, recipe: Recipe, seed: int, device: str = "cpu",
     checkpoint: Path | None = None, tell: Callable[[int, History], None] = lambda epoch, history: None,
