@@ -10,10 +10,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from simgap.data.formats.description import check_described
 from simgap.data.formats.folder import load_folder
 from simgap.data.formats.headings import find, listed
-from simgap.data.formats.one_record import Choices, dataset_of, record_of
+from simgap.data.formats.logs import ENDINGS, is_described, logs_of, record_of_logs
+from simgap.data.formats.one_record import Choices, dataset_of
 from simgap.data.formats.plant_table import with_known
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
@@ -22,7 +22,6 @@ from simgap.data.simulated_columns import split_off
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
-ENDINGS = (".csv", ".mat", ".parquet", ".txt", ".tsv", ".dat")  # of files of one record; any name may be one
 Kinds = str | Mapping[str, str] | None
 
 
@@ -62,12 +61,13 @@ def load(
     split_gaps: bool = False,
     known: Mapping[str, Any] | None = None,
 ) -> Dataset:
-    """Load a data set: a registered name, a folder with dataset.toml, a file of one record or a pandas DataFrame.
+    """Load a data set: a registered name, a folder, a file of one record or a pandas DataFrame.
 
     A name may carry parameters where its data set takes some, "gimbal-noise4-delay0.2".
     A file (CSV, .mat or .parquet) and a DataFrame are one record: `inputs` and `outputs` name its columns, with or
     without the unit that stands there. The sampling time is that of the time column or `dt` in seconds, and the record
-    is split in time 60/20/20. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
+    is split in time 60/20/20. A folder without a dataset.toml holds such files with the same columns, one record in
+    the order of their names. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
     `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap.
     `known` is what a table [plant] of a dataset.toml says of the machine, {"mass": "0.5 kg"}.
     Raises UnusableInput when the data cannot be used, and its subclass Missing when they are not at hand.
@@ -97,9 +97,8 @@ def read(
         dataset, said = described, ()
     else:
         choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
-        table = read_table(source, choices)
-        name = name or (Path(source).stem if isinstance(source, str | os.PathLike) else "DataFrame")
-        dataset, said = dataset_of(table, choices, name)
+        record = record_of_logs(read_tables(source, choices), choices)
+        dataset, said = dataset_of(record, name or Path(record.source).stem), record.said
     theirs = None
     if simulated:
         dataset, theirs = split_off(dataset, simulated)
@@ -112,31 +111,34 @@ def read_recordings(
 ) -> Recordings:
     """Read what a model that was fitted on such channels can simulate; the other arguments are those of `load`.
 
-    A file is one experiment, unsplit, of the columns that the channels name. Raises UnusableInput.
+    A file is one experiment, unsplit, of the columns that the channels name, and so is each file of a folder without a
+    dataset.toml. Raises UnusableInput.
     """
     of_file = Choices(dt=dt, resample=resample, split_gaps=split_gaps)
     choices = replace(of_file, inputs=[c.name for c in channels.inputs], outputs=[c.name for c in channels.outputs])
     known = source if isinstance(source, Dataset) else _known(source, of_file)
     if known is not None:
         return Recordings(known.test, known.training.valid + known.training.train, known.channels)
-    table = read_table(source, choices)
-    for column in (*choices.inputs, *choices.outputs):
-        if not find(table.names, column):
-            raise UnusableInput(f"{table.source} has no column {column!r}, which the model was fitted on; "
-                                f"there are {listed(table.names)}")  # fmt: skip
-    record = record_of(table, choices)
+    tables = read_tables(source, choices)
+    for table in tables:
+        for column in (*choices.inputs, *choices.outputs):
+            if not find(table.names, column):
+                raise UnusableInput(f"{table.source} has no column {column!r}, which the model was fitted on; "
+                                    f"there are {listed(table.names)}")  # fmt: skip
+    record = record_of_logs(tables, choices)
     return Recordings(record.pieces, (), record.channels)
 
 
 def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Dataset | None:
-    """Load a source that describes itself; None for a file and a DataFrame."""
+    """Load a source that describes itself; None for a file, a DataFrame and a folder of files alone."""
     if isinstance(source, str) and is_registered(source):
         _refuse_columns(choices, f"data set {source}")
         return load_registered(source)
     if not isinstance(source, str | os.PathLike):
         return None
     if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
-        check_described(Path(source))
+        if not is_described(Path(source)):
+            return None
         _refuse_columns(choices, f"folder {Path(source)}")
         return load_folder(Path(source), simulated)
     if not os.path.exists(source):  # noqa: PTH110
@@ -160,6 +162,13 @@ def _nowhere(source: str) -> str:
         if alike:
             return f"there is no file {source}; is {' or '.join(alike)} meant?"
     return f"there is no file {source}, seen from the folder {Path.cwd()}"
+
+
+def read_tables(source: Any, choices: Choices) -> list[Table]:
+    """Read a DataFrame, a file, or all logs of a folder, whose columns are the same. Raises UnusableInput."""
+    if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112
+        return [read_table(file, choices) for file in logs_of(Path(source))]
+    return [read_table(source, choices)]
 
 
 def read_table(source: Any, choices: Choices) -> Table:

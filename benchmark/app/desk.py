@@ -60,7 +60,7 @@ class OpenRecord:
             raise UnusableInput(f"{path!r} is no name for a file of a record")
         source = f"./{parts[0]}"  # so that it is never the name of a data set that simgap knows
         if self.source not in ("", source) or self.files >= MOST_FILES:
-            raise UnusableInput(f"drop one file, or one folder of at most {MOST_FILES} files")
+            raise UnusableInput(f"drop files alone, or one folder, and at most {MOST_FILES} of them")
         self.source, self.cwd, self.files = source, self.folder / "files", self.files + 1
         file = self.cwd.joinpath(*parts)
         try:

@@ -12,12 +12,13 @@ import numpy as np
 from simgap.app.orders import Column, Curve, Look, Role, Settings
 from simgap.data.formats.clock import Clock, read_clock, time_column
 from simgap.data.formats.headings import find, heading_of, listed
+from simgap.data.formats.logs import is_described
 from simgap.data.formats.one_record import Choices
 from simgap.data.formats.plant_table import parse_known, with_known
 from simgap.data.formats.sampling import sampling_time
 from simgap.data.formats.tables import Table
 from simgap.data.kinds import kind_of, with_kinds
-from simgap.data.loading import Reading, read, read_table
+from simgap.data.loading import Reading, read, read_tables
 from simgap.records import Channel, Channels, Dataset, UnusableInput
 from simgap.registry import DATASETS
 from simgap.reports.diagnosis.traces import thin
@@ -29,9 +30,9 @@ SIMULATED = {"sim", "simulated", "simulation"}
 
 def look(source: str) -> Look:
     """Read what a data set, a folder or a file holds. Raises UnusableInput."""
-    if source in DATASETS or Path(source).is_dir():
+    if source in DATASETS or (Path(source).is_dir() and is_described(Path(source))):
         return _of_dataset(read(source).dataset)
-    return _of_table(read_table(source, Choices()))
+    return _of_logs(read_tables(source, Choices()))
 
 
 def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: Mapping[str, str]) -> Settings:
@@ -119,7 +120,9 @@ def _of_dataset(dataset: Dataset) -> Look:
     return Look(samples, columns, curves, "time [s]", fixed=True, dt=first.dt, about=about)
 
 
-def _of_table(table: Table) -> Look:
+def _of_logs(tables: Sequence[Table]) -> Look:
+    """Show the first of several logs, or the only one."""
+    table = tables[0]
     time = time_column(table, set())
     clock, dt, uneven = _time(table, time)
     t = np.arange(len(table), dtype=np.float64) if clock is None else clock.seconds - clock.seconds[0]
@@ -135,9 +138,10 @@ def _of_table(table: Table) -> Look:
         columns.append(column)
         curves.append(_curve(heading, t, values))
     left_out = len(table.names) - MOST
-    about = f"{left_out} more columns are not shown" if left_out > 0 else ""
+    about = [f"{len(tables)} logs; shown is {Path(table.source).name}"] if len(tables) > 1 else []
+    about += [f"{left_out} more columns are not shown"] if left_out > 0 else []
     x_title = "row" if clock is None else "time [s]"
-    return Look(len(table), columns, curves, x_title, False, time or "", dt, uneven, about)
+    return Look(sum(map(len, tables)), columns, curves, x_title, False, time or "", dt, uneven, "; ".join(about))
 
 
 def _time(table: Table, column: str | None) -> tuple[Clock | None, float | None, str]:

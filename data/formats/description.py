@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import tomllib
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from reprlib import repr as short
@@ -74,22 +72,7 @@ def check_columns(columns: tuple[str, ...], source: str) -> None:
             )
 
 
-def check_described(folder: Path) -> None:
-    """Raise UnusableInput for a folder without a dataset.toml, and say what it holds instead."""
-    if os.path.isfile(folder / FILE):  # noqa: PTH113  # unlike Path.is_file it never raises
-        return
-    with suppress(OSError):  # of a folder that may not be read
-        files = sorted(file.name for file in folder.glob("*.csv"))
-        if files:
-            raise UnusableInput(
-                f"{folder} holds no {FILE}, which says what the columns of its files are; write one (docs/data.md "
-                f"shows how), or give a single CSV file such as {folder / files[0]}"
-            )
-    raise UnusableInput(f"{folder} holds no {FILE}, and no CSV file; give a folder with both, or a single CSV file")
-
-
 def _parse(file: Path) -> dict[str, Any]:
-    check_described(file.parent)
     try:
         return tomllib.loads(file.read_bytes().decode("utf-8-sig"))
     except OSError as error:

@@ -32,18 +32,18 @@ class Choices:
 
 @dataclass(frozen=True, eq=False)
 class OneRecord:
-    """What a table holds: the record, or its pieces between gaps, its channels, and in words what was inferred."""
+    """A record: in one piece or in several, its channels, and in words what was inferred of it."""
 
+    source: str
     pieces: tuple[Experiment, ...]
     channels: Channels
     said: tuple[str, ...]
 
 
-def dataset_of(table: Table, choices: Choices, name: str) -> tuple[Dataset, tuple[str, ...]]:
-    """Make a data set of one record, and say in words what was inferred beside the kinds. Raises UnusableInput."""
-    record = record_of(table, choices)
+def dataset_of(record: OneRecord, name: str) -> Dataset:
+    """Split a record in time. Raises UnusableInput."""
     splits = split_in_time(record.pieces[0]) if len(record.pieces) == 1 else split_pieces(record.pieces)
-    return assemble(name, splits, record.channels, None, table.source), record.said
+    return assemble(name, splits, record.channels, None, record.source)
 
 
 def record_of(table: Table, choices: Choices) -> OneRecord:
@@ -63,7 +63,8 @@ def record_of(table: Table, choices: Choices) -> OneRecord:
     else:
         step = _sampling_time(table, clock, choices)
         pieces, said = (table.experiment("record", inputs, outputs, step),), ()
-    return OneRecord(tuple(pieces), channels, _told(table, clock, channels, pieces[0].dt, choices, said))
+    said = _told(table, clock, channels, pieces[0].dt, choices, said)
+    return OneRecord(table.source, tuple(pieces), channels, said)
 
 
 def _check(table: Table, choices: Choices) -> None:

@@ -39,7 +39,7 @@ def tab(browser, served):
 
 
 def choose(page, file) -> None:
-    page.get_by_label("Choose a file").set_input_files(file)
+    page.get_by_label("Choose files").set_input_files(file)
     page.locator("#plot .main-svg").first.wait_for()
 
 
@@ -118,7 +118,7 @@ def test_a_bad_cell_gets_the_sentence_of_the_command_line(tab, tmp_path):
     (tmp_path / "empty.csv").write_text("")
     sentence = simgap("data", "check", "empty.csv", cwd=tmp_path).stderr.removeprefix("simgap: ").strip()
     page = tab()
-    page.get_by_label("Choose a file").set_input_files(tmp_path / "empty.csv")
+    page.get_by_label("Choose files").set_input_files(tmp_path / "empty.csv")
     assert page.get_by_role("alert").inner_text() == sentence
 
 
@@ -168,6 +168,19 @@ def test_two_tabs_diagnose_at_once_and_each_gets_its_own_answer(tab, tmp_path):
         page.get_by_role("link", name="Take the model away").wait_for()
         assert page.title() == f"Diagnosis of {name}"
     assert "Coulomb friction" in pages[0].locator("h1").inner_text()
+
+
+def test_several_files_are_logs_of_one_machine(tab, tmp_path):
+    for k in range(3):
+        write_cart(tmp_path / f"run{k}.csv", samples=300, seed=k)
+    page = tab()
+    choose(page, [tmp_path / f"run{k}.csv" for k in range(3)])
+    assert "900 samples" in page.locator("h1 + p").inner_text()
+    assert "3 logs; shown is run0.csv" in page.locator("h1 + p").inner_text()
+    say(page, "input", "output", "velocity")
+    page.get_by_role("button", name="Diagnose").click()
+    page.get_by_role("link", name="Take the model away").wait_for()
+    assert "Coulomb friction" in page.locator("h1").inner_text()
 
 
 @pytest.mark.slow

@@ -82,3 +82,13 @@ def no_files(tmp_path: Path, monkeypatch) -> Path:
     monkeypatch.setattr("simgap.data.measured.locations.roots", lambda: [cache])
     monkeypatch.setattr("simgap.data.measured.fetching.cache", lambda: cache)
     return cache
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    """Ten logs of 40 rows: log1.csv to log10.csv."""
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    for k in range(1, 11):
+        (folder / f"log{k}.csv").write_text(csv_text(40, k))
+    return folder

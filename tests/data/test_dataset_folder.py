@@ -127,11 +127,8 @@ def test_inputs_that_are_no_tables_are_refused(good, refused):
     assert "one [[inputs]] table per column" in refused(good)
 
 
-def test_a_folder_without_description_is_told_what_it_needs(refused, tmp_path):
-    assert "holds no dataset.toml, and no CSV file" in refused(tmp_path)
-    (tmp_path / "run.csv").write_text("t,u,phi\n")
-    for named in ({}, {"inputs": ["u"], "outputs": ["phi"]}):
-        assert f"a single CSV file such as {tmp_path / 'run.csv'}" in refused(tmp_path, **named)
+def test_a_folder_of_nothing_is_told_what_it_needs(refused, tmp_path):
+    assert "holds no dataset.toml and no CSV file; give a folder of CSV files" in refused(tmp_path)
 
 
 def test_a_description_that_is_not_utf_8_is_refused_by_its_line(good, refused):

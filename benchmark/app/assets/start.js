@@ -1,4 +1,4 @@
-// Takes a dropped or chosen file or folder, sends it to the server on this machine and opens its page.
+// Takes dropped or chosen files or a folder, sends it to the server on this machine and opens its page.
 const drop = document.getElementById("drop"), said = document.getElementById("said");
 const largest = Number(drop.dataset.largest);
 
@@ -20,7 +20,9 @@ async function refusalOf(answer) {
 
 async function send(files) {
   if (!files.length) throw new Error("there is no file in it");
-  if (new Set(files.map(([path]) => path.split("/")[0])).size > 1) throw new Error("drop one file or one folder at a time");
+  const top = new Set(files.map(([path]) => path.split("/")[0]));
+  if (top.size > 1 && files.some(([path]) => path.includes("/"))) throw new Error("drop one folder at a time, or files alone");
+  if (top.size > 1) files = files.map(([path, file]) => [`${top.size} logs/${path}`, file]);
   const size = files.reduce((sum, [, file]) => sum + file.size, 0), name = files[0][0].split("/")[0];
   if (size > largest) throw new Error(`${name} has ${Math.round(size / 1e6)} MB and this page takes ${largest / 1e6} MB: cut the record, or give it on the command line, where there is no limit: simgap open ${name}`);
   const { key } = await (await fetch("records", { method: "POST" })).json();

@@ -1,0 +1,76 @@
+"""Several logs of one machine, as files with the same columns in one folder, without a dataset.toml."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from simgap.data.formats.description import FILE
+from simgap.data.formats.folder import natural_order
+from simgap.data.formats.one_record import Choices, OneRecord, record_of
+from simgap.data.formats.sampling import DRIFT_TOLERANCE
+from simgap.data.formats.tables import Table
+from simgap.records import UnusableInput
+
+ENDINGS = (".csv", ".mat", ".parquet", ".txt", ".tsv", ".dat")  # of files of one record; any name may be one
+
+
+def is_described(folder: Path) -> bool:
+    """Tell whether a folder holds a dataset.toml."""
+    return os.path.isfile(folder / FILE)  # noqa: PTH113  # unlike Path.is_file it never raises
+
+
+def logs_of(folder: Path) -> list[Path]:
+    """List the files of records in a folder, by name: those with the first of the known endings that is there.
+
+    Raises UnusableInput where there is none.
+    """
+    with suppress(OSError):  # of a folder that may not be read
+        files = [file for file in folder.iterdir() if file.is_file() and not file.name.startswith(".")]
+        for ending in ENDINGS:
+            found = [file for file in files if file.suffix.lower() == ending]
+            if found:
+                return sorted(found, key=lambda file: natural_order(file.name))
+    raise UnusableInput(
+        f"{folder} holds no {FILE} and no CSV file; give a folder of CSV files with the same columns, or a single one"
+    )
+
+
+def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:
+    """Read the chosen columns of several logs as the pieces of one record, each under the name of its log.
+
+    Raises UnusableInput where two are sampled differently, or differ in a unit.
+    """
+    records = [record_of(table, choices) for table in tables]
+    if len(records) == 1:
+        return records[0]
+    first, pieces = records[0], []
+    for table, record in zip(tables, records, strict=True):
+        _check_alike(tables[0], first, table, record)
+        name = Path(table.source).stem
+        for x in record.pieces:
+            pieces.append(
+                replace(x, name=name if len(record.pieces) == 1 else f"{name}_{x.name}", dt=first.pieces[0].dt)
+            )
+    said = f"{len(tables)} logs, parted 60/20/20 in the order of their names"
+    return OneRecord(str(Path(tables[0].source).parent), tuple(pieces), first.channels, (said, *first.said))
+
+
+def _check_alike(table: Table, record: OneRecord, other: Table, its: OneRecord) -> None:
+    """Raise UnusableInput unless both records have one sampling time, within 1 %, and the same units."""
+    dt, its_dt = record.pieces[0].dt, its.pieces[0].dt
+    if abs(its_dt - dt) > DRIFT_TOLERANCE * dt:
+        raise UnusableInput(
+            f"{other.source} is sampled every {its_dt:g} s and {table.source} every {dt:g} s; resample all (--resample "
+            f"{max(dt, its_dt):g}), or put them into folders of their own"
+        )
+    channels, its_channels = ((*x.channels.inputs, *x.channels.outputs) for x in (record, its))
+    for channel, its_channel in zip(channels, its_channels, strict=True):
+        if channel.unit != its_channel.unit:
+            raise UnusableInput(
+                f"{other.source}: {its_channel.name!r} is in {its_channel.unit or 'no unit'!r}, but in "
+                f"{channel.unit or 'no unit'!r} in {table.source}; convert one of them and correct its heading"
+            )

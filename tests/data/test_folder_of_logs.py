@@ -1,0 +1,78 @@
+"""A folder of logs without a description: one record in the order of the names of its files."""
+
+import numpy as np
+import pytest
+
+from simgap.baselines.arx import Arx
+from simgap.data import load
+from simgap.data.loading import read, read_recordings
+
+COLUMNS = {"inputs": ["u"], "outputs": ["phi"]}
+
+
+def names(experiments):
+    return [experiment.name for experiment in experiments]
+
+
+def test_whole_logs_are_parted_60_20_20_in_the_order_of_their_numbers(logs):
+    data = load(logs, **COLUMNS)
+    assert data.name == "logs"
+    assert names(data.training.train) == [f"log{k}" for k in range(1, 7)]
+    assert names(data.training.valid) == ["log7", "log8"]
+    assert names(data.test) == ["log9", "log10"]
+    alone = load(logs / "log10.csv", **COLUMNS)
+    whole = np.concatenate([x.y for x in (*alone.training.train, *alone.training.valid, *alone.test)])
+    assert np.array_equal(data.test[1].y, whole)
+
+
+def test_one_log_in_a_folder_is_the_record_of_that_file(logs):
+    for k in range(2, 11):
+        (logs / f"log{k}.csv").unlink()
+    assert load(logs, **COLUMNS, name="one").sha256 == load(logs / "log1.csv", **COLUMNS, name="one").sha256
+
+
+def test_what_was_inferred_says_how_many_logs_there_are(logs):
+    assert "10 logs, parted 60/20/20 in the order of their names" in read(logs, **COLUMNS).said
+
+
+def test_files_of_other_endings_beside_the_csv_files_and_hidden_ones_are_no_logs(logs):
+    for name in ("notes.txt", ".log0.csv", "photo.png"):
+        (logs / name).write_text("no log")
+    (logs / "old.csv").mkdir()
+    assert len(read(logs, **COLUMNS).dataset.training.train) == 6
+
+
+def test_a_gap_in_one_log_parts_that_one(logs):
+    lines = (logs / "log1.csv").read_text().splitlines(keepends=True)
+    (logs / "log1.csv").write_text("".join(lines[:16] + lines[21:]))
+    data = load(logs, **COLUMNS, split_gaps=True)
+    assert names(data.training.train)[:3] == ["log1_piece_1", "log1_piece_2", "log2"]
+
+
+def test_a_fitted_model_simulates_each_log(logs):
+    data = load(logs, **COLUMNS)
+    model = Arx()
+    model.fit(data.training, 0)
+    recordings = read_recordings(logs, data.channels)
+    assert names(recordings.experiments) == [f"log{k}" for k in range(1, 11)]
+    assert not recordings.others
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text.replace("phi", "psi"), "log3.csv: row 1 has no column 'phi'"),
+        (lambda text: text.replace("phi", "phi [deg]"), "log3.csv: 'phi' is in 'deg', but in 'no unit' in"),
+        (lambda text: text.replace("t,", "t_ms,"), "log3.csv is sampled every 0.0001 s and"),
+        (lambda text: text.replace("\n2.0", "\n2.x"), "log3.csv: row"),
+    ],
+)
+def test_a_log_that_does_not_fit_the_others_is_named(logs, refused, change, said):
+    text = (logs / "log3.csv").read_text()
+    assert change(text) != text
+    (logs / "log3.csv").write_text(change(text))
+    assert said in refused(logs, **COLUMNS)
+
+
+def test_the_columns_are_asked_for_as_of_a_single_file(logs, refused):
+    assert "log1.csv: say which columns are the inputs" in refused(logs)
