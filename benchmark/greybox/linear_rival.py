@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.effects.periodic_disturbance import PeriodicDisturbance
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import block_errors, in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
@@ -44,8 +45,8 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     what the linear model leaves of records that neither was fitted to: no order has such a stand-in. A lag or a delay
     is a linear model itself, of few parameters, and is believed as long as more of them hardly help, be it beside what
     the lag takes of the error or beside what it leaves. None too where effects are of single experiments and cannot be
-    forecast. The orders of an output that is no motion and no level
-    have been tried already; see `_of_tried_order`.
+    forecast, and where the linear model holds a periodic disturbance as a swing of its own. The orders of an output
+    that is no motion and no level have been tried already; see `_of_tried_order`.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
     output, *others = plain.outputs
@@ -55,6 +56,8 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         return _of_tried_order(selection, channels)
     whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
+    if _swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
+        return None
     with_effects, without, of_linear = (
         block_errors(fit, plain.valid, data.n_init, plain.train) for fit in (chosen, plain.estimate, linear.estimate)
     )
@@ -70,6 +73,17 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     if beaten or halves_speak_for(plain, chosen, linear.estimate):
         return None
     return LinearRival.of(linear, gain)
+
+
+def _swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: float) -> bool:
+    """Tell whether a linear model has poles, undamped as far as records show, at the frequency of a disturbance.
+
+    Where every record begins at the same phase, they swing on from the usual start as the disturbance does.
+    """
+    poles = np.linalg.eigvals(linear.plant.matrix(linear.theta))
+    disturbances = [term for term in chosen.plant.terms if isinstance(term.effect, PeriodicDisturbance)]
+    frequencies = [chosen.theta[chosen.plant.part_of(term)][1] for term in disturbances]
+    return any(np.min(np.abs(poles - 2j * math.pi * f)) < 2 * math.pi / duration for f in frequencies)
 
 
 def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:
