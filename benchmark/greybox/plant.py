@@ -89,8 +89,7 @@ class Plant:
         The conditions of a known machine differ from run to run, and a drift of each run's own would stand for them.
         """
         if self.swings:
-            # Its order holds every lag, its offset every load; what its transmission carries is not among its states.
-            return not effect.adds_pole and effect.name not in ("constant_load", "sensor_bias", "load_friction")
+            return not effect.of_one_mass
         if self.machine is None:
             return True
         if not isinstance(effect, InputEffect) or not self.machine.controlled:

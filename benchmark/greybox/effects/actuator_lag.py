@@ -56,6 +56,7 @@ class ActuatorLag(InputEffect):
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     linear: ClassVar[bool] = True
     adds_pole: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
     confounders: ClassVar[dict[str, str]] = {
         "input_delay": (

@@ -22,6 +22,7 @@ class ConstantLoad(ForceEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 4"
     role: ClassVar[Role] = "force"
     linear: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
     # The mean input that holds it drives an axis away that is modelled without it.
     may_move_poles_of: ClassVar[tuple[str, ...]] = ("position",)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("offset", "position", "time since the start")

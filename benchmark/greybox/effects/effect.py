@@ -146,6 +146,8 @@ class Effect(ABC):
     linear: ClassVar[bool] = False
     # A linear model of one order more does the same.
     adds_pole: ClassVar[bool] = False
+    # A drive of several masses has it as order or as offset, or does not have the state that it acts on.
+    of_one_mass: ClassVar[bool] = False
     # May explain what otherwise asks for a higher order of the plant.
     instead_of_order: ClassVar[bool] = False
     # The linear plant fitted without it has other poles, so that a fit with it searches for the poles anew.

@@ -32,6 +32,7 @@ class LoadFriction(ForceEffect):
     memory: ClassVar[int] = 2
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"coulomb_friction": (0,)}
     shows_in: ClassVar[tuple[ViewName, ...]] = ("sign of velocity", "velocity", "rate of change", "time since reversal")
+    of_one_mass: ClassVar[bool] = True
     confounders: ClassVar[dict[str, str]] = {
         "coulomb_friction": "repeat a slow stroke with twice the load: friction that grows with it doubles as well",
         "stribeck_friction": "repeat a slow stroke with twice the load: Stribeck friction stays the same",

@@ -29,6 +29,7 @@ class SensorBias(OutputEffect):
         "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
     }
     per_experiment: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the bias."""

@@ -27,6 +27,7 @@ class SensorLag(OutputEffect):
     place_in_chain: ClassVar[int] = 110
     linear: ClassVar[bool] = True
     adds_pole: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
