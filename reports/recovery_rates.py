@@ -7,6 +7,7 @@ from math import sqrt
 from typing import Any
 
 from simgap.reports.tables import Cell, Table
+from simgap.wording import number
 
 Z = 1.959964  # of 95 %
 RIGHT = {
@@ -81,4 +82,4 @@ def _cell(rate: list[int]) -> Cell:
 
 
 def _number(value: float | int | None) -> str:
-    return "" if value is None else f"{value:.2g}" if value < 10 else f"{value:.0f}"
+    return "" if value is None else number(float(value), 2)

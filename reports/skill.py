@@ -12,6 +12,7 @@ from jaxtyping import Float
 from simgap.records import Result
 from simgap.reports.pooling import Standing, standings
 from simgap.reports.tables import Cell, Table
+from simgap.wording import number
 
 AGAINST = "arx"
 FEWEST = 3  # data sets
@@ -50,7 +51,7 @@ def skill_table(results: Sequence[Result]) -> Table | None:
         rows.append([
             Cell(model), Cell(of_skill, skill), Cell(of_rate, rate),
             Cell(f"{np.sum(~np.isnan(table[i]))} of {len(datasets)}"),
-            Cell(f"{statistics.median_low(sizes)}" if sizes else ""), Cell(f"{seconds:.2g}", seconds),
+            Cell(f"{statistics.median_low(sizes)}" if sizes else ""), Cell(number(seconds, 2), seconds),
         ])  # fmt: skip
     rows.sort(key=lambda row: -(row[1].value or 0.0))
     notes = [

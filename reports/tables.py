@@ -13,6 +13,7 @@ from simgap.records import Result
 from simgap.reports.error_ratios import HOW_IT_IS_MADE, HOW_TO_READ, ErrorRatio, Ratios
 from simgap.reports.pooling import Spread, Standing, standings
 from simgap.results.store import plain
+from simgap.wording import number
 
 # More test experiments than these are pooled into one column.
 COLUMNS_PER_EXPERIMENT = 4
@@ -109,7 +110,7 @@ def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, 
         rows.append([
             Cell(standing.model), Cell(status_of(standing) + notes.of(standing)),
             *errors, *_fit_cells(standing, ratios), *ahead,
-            Cell("" if size is None else str(size)), Cell("" if seconds is None else f"{seconds:.2g}"),
+            Cell("" if size is None else str(size)), Cell("" if seconds is None else number(seconds, 2)),
         ])  # fmt: skip
     n_errors = len(groups) * len(units)
     for column in range(2, n_errors + 2):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from simgap.reports.pooling import Standing
 from simgap.reports.tables import HORIZONS, Cell, Notes, Table, spread_cell, status_of
+from simgap.wording import number
 
 COLUMNS = [
     "data set", "status", "fit %", "output", "unit", "RMSE", *(f"{h} ahead" for h in HORIZONS), "parameters", "fit s"
@@ -28,7 +29,7 @@ def model_table(found: Sequence[Standing], title: str) -> Table:
                 spread_cell(standing.rmse(output, ()), ".4g", standing.failed),
                 *(_ahead(standing, output, horizon) for horizon in HORIZONS),
                 Cell("" if size is None else str(size)),
-                Cell("" if seconds is None else f"{seconds:.2g}"),
+                Cell("" if seconds is None else number(seconds, 2)),
             ])  # fmt: skip
     return Table(title, COLUMNS, rows, notes.texts)
 

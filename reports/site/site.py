@@ -267,5 +267,5 @@ def _what(label: str) -> str:
     """Say what a model is: the first line of its own description, or its name in the paper."""
     name = label.removesuffix(WINDOWED)
     if name in MODELS:
-        return MODELS.title(name) + (" Here it sees windows of inputs only." if name != label else "")
+        return MODELS.title(name).replace("`", "") + (" Here it sees windows of inputs only." if name != label else "")
     return f"In the paper: {NAMES[label]}." if label in NAMES else "A model with a label of its own."
