@@ -7,7 +7,16 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.additions import Among, Extended, as_special_case, extend, key_of, with_any_more
+from simgap.greybox.additions import (
+    Among,
+    Extended,
+    add,
+    as_special_case,
+    extend,
+    from_other_poles,
+    key_of,
+    with_any_more,
+)
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
@@ -130,10 +139,26 @@ class _Search:
         """Add what has numbers of its own in every experiment; where that is better, all effects may join it."""
         # Beside nothing, all have been fitted already, and are what such an effect must be told from.
         larger = self.backward(self.forward(trial, "own") if trial.terms else self.forward(trial))
+        larger = self._told_apart(larger)
         alone = self._assess(trial.estimate)  # under the same noise
         if larger.terms == trial.terms or larger.score < alone.score + BETTER:
             return alone
         return self.settled(self.forward(larger))
+
+    def _told_apart(self, trial: Trial) -> Trial:
+        """Try what has own numbers in each experiment in the place of another, and laws with more of them."""
+        for term in trial.terms:
+            if term.effect.own and term in trial.terms:
+                trial = self._better(trial, self._in_place_of(term, trial, "own"))
+        for term in candidates(self.baseline):
+            if not term.effect.own or term.effect.refined is None:
+                continue
+            rest = self._without(trial, term) if term in trial.terms else trial
+            estimate = add(self.baseline, rest.estimate, Term(term.effect.refined(), term.channel))
+            larger = self._assess(from_other_poles(self.baseline, rest.estimate, estimate))
+            if significant(self.baseline, rest, larger):
+                trial = self._better(trial, [larger])
+        return trial
 
     def forward(self, trial: Trial, *asked: Among) -> Trial:
         """Add the best effect, or of those asked for, one after the other, while noise alone would not do as well."""

@@ -1,53 +1,45 @@
-"""A load on the plant that changes slowly."""
+"""A load on the plant that grows from the start of each record."""
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, final
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.wandering_load import WanderingLoad
 from simgap.registry import EFFECTS
 
 
 @EFFECTS.register("load_drift")
 @final
 class LoadDrift(ForceEffect):
-    """f = sum over k of r_k sqrt(2 k + 1) P_k(2 t / T - 1), P_k of Legendre, with other r in every experiment of T s.
+    """f = r sqrt(3) t / T, with another r in every experiment of T s; r is the rms of the load.
 
-    The norm of r is the rms of the load.
+    It has as many numbers as a drift of the sensor, from which the records must tell it. A load that comes and goes is
+    tried after it.
     """
 
-    name: ClassVar[str] = "load_drift"
-    title: ClassVar[str] = "a drifting load"
-    explanation: ClassVar[str] = (
-        "A force, a flow or a heat from outside comes and goes slowly: a leak that opens, the room that cools down, "
-        "a cable that winds up, a bearing that warms."
-    )
-    reference: ClassVar[str] = "Ljung, System Identification, 1999, section 14.1"
-    own: ClassVar[int] = 5
+    name: ClassVar[str] = WanderingLoad.name
+    title: ClassVar[str] = WanderingLoad.title
+    explanation: ClassVar[str] = WanderingLoad.explanation
+    reference: ClassVar[str] = WanderingLoad.reference
+    own: ClassVar[int] = 1
     substeps: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
-    confounders: ClassVar[dict[str, str]] = {
-        "sensor_drift": (
-            "hold the machine still, or read it with a second sensor: the reading of a drifting sensor still moves, "
-            "while a load that drifts has moved the machine itself"
-        ),
-        "constant_load": "record for longer: a load that drifts goes on changing, a constant one does not",
-        "gain_fade": "record without any input: a load that drifts is still there, a fading gain has nothing to act on",
-        "periodic_disturbance": "record for longer: a disturbance repeats itself, a load that drifts does not",
-    }
+    refined: ClassVar[type[Effect] | None] = WanderingLoad
+    shows_in: ClassVar[tuple[ViewName, ...]] = WanderingLoad.shows_in
+    confounders: ClassVar[dict[str, str]] = WanderingLoad.confounders
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the size of the load."""
-        return (Parameter("load", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),)
+        return WanderingLoad().parameters(scales)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from a small load; its course is then estimated."""
-        return [Start((0.1 * scales.force_rms,), amplitude=0)]
+        """Start from a small load; its size in each experiment is then estimated."""
+        return WanderingLoad().starts(scales)
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
@@ -55,6 +47,5 @@ class LoadDrift(ForceEffect):
 
     @staticmethod
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:
-        """Return Legendre's polynomials, each of rms 1."""
-        powers = np.arange(LoadDrift.own)
-        return np.sqrt(2 * powers + 1)[:, None] * legvander(2 * t / duration - 1, LoadDrift.own - 1).T
+        """Return the line from zero, of rms 1."""
+        return math.sqrt(3) * (t / duration)[None]
