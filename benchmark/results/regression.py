@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -18,14 +18,15 @@ from simgap.results import store
 Change = Literal["same", "better", "worse", "missing", "new"]
 
 # Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it,
-# and of one whose numbers depend on the seed; three times the spread of the seeds counts if that is more.
+# and of one whose numbers depend on the seed; more where its seeds spread more.
 COMPUTED = 1e-5
 STOCHASTIC = 0.05
-SIGMAS = 3.0
-ALARM = 0.001  # chance of one where nothing but rounding changed, of a mean over seeds
+SIGMAS = 3.0  # of the seeds of a model that computes, which rounding tells apart
+ALARM = 0.001  # chance of one where nothing but rounding changed
 # Share of the spread of what was measured below which an RMSE is rounding.
 ROUNDING = 1e-9
 ON_AVERAGE = "on average"
+EVERYWHERE = "all data sets"
 
 FigureName = tuple[str, str, str]  # experiment, task, and output with its horizon
 
@@ -34,8 +35,8 @@ FigureName = tuple[str, str, str]  # experiment, task, and output with its horiz
 class Comparison:
     """One RMSE before and after, in the output's unit, and the limit above which it is worse.
 
-    The figure `on average` is the geometric mean over all RMSEs of a model on a data set, whose units do not matter as
-    it is only compared with itself. None: there is none.
+    The figure `on average` is the geometric mean over all RMSEs of a model on a data set, or on all; their units do not
+    matter as it is only compared with itself. None: there is none.
     """
 
     suite: str
@@ -66,10 +67,15 @@ class Regression:
 def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
     """Compare the results in a folder with those of a reference, suite by suite.
 
-    An RMSE is worse when it exceeds the reference by more than max(3 sigma of the reference's seeds, 1e-5 of it), or
-    max(3 sigma, 5 %) for a model that declares itself stochastic. The seeds of a model that only computes differ by how
-    rounding falls (`simgap.running.rounding`). The geometric mean of the RMSEs per model and data set is worse by more
-    than 5 % and more than the changes of the same seeds scatter. A row of the reference is missing when the new results
+    An RMSE of a model that computes is worse when it exceeds the reference by more than max(3 sigma of its seeds, 1e-5
+    of it); its seeds differ by how rounding falls (`simgap.running.rounding`). One of a model that declares itself
+    stochastic may exceed it by 5 %, or as far as one of two draws exceeds the other once in a thousand,
+
+        t(0.999; n - 1) sqrt(2) sigma of n seeds,
+
+    because a long training makes another draw of every seed on another processor. What that hides shows on average: the
+    geometric mean of the RMSEs per model and data set, and over all data sets, is worse by more than 5 % and more than
+    the changes of the same seeds scatter (Student's paired t). A row of the reference is missing when the new results
     lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
@@ -94,11 +100,18 @@ def compare(suite: str, before: Sequence[Result], after: Sequence[Result]) -> li
     theirs, ours = _grouped(before), _grouped(after)
     seeds = {row.seed for row in after}
     comparisons: list[Comparison] = []
+    everywhere: dict[tuple[str, str], list[_Group]] = {}
     for group, rows in theirs.items():
-        model, _, dataset = group
+        model, params, dataset = group
         compared = _Group(suite, model, dataset, rows, ours.get(group, []))
         comparisons += compared.row_by_row(seeds)
-        comparisons += compared.on_average()
+        if compared.pairs:
+            comparisons.append(compared.judged_on_average(compared.pairs))
+            everywhere.setdefault((model, params), []).append(compared)
+    for groups in everywhere.values():
+        if len(groups) > 1:
+            pairs = [pair for one in groups for pair in one.pairs]
+            comparisons.append(replace(groups[0], dataset=EVERYWHERE).judged_on_average(pairs))
     for group in ours.keys() - theirs.keys():
         comparisons.append(Comparison(suite, group[0], group[2], ON_AVERAGE, None, None, None, math.inf, "new"))
     return comparisons
@@ -127,34 +140,37 @@ class _Group:
                 continue
             figures = _figures(now)
             for name, (value, scale) in _figures(row).items():
-                limit = value + self._allowed(value, self._spread.get(name, 0.0), scale)
+                limit = value + self._allowed(value, *self._spread.get(name, (0.0, 1)), scale)
                 figure = ", ".join(name)
                 if name not in figures:
                     yield self._comparison(figure, row.seed, value, None, limit, "missing", now.message or now.status)
                 else:
                     yield self._judged(figure, row.seed, value, figures[name][0], limit, now)
 
-    def on_average(self) -> Iterator[Comparison]:
-        """The geometric mean of all figures of both, which spreads less than each of them.
+    @cached_property
+    def pairs(self) -> list[tuple[float, float]]:
+        """The mean logarithm of all figures before and after, of each seed of both; none where seeds do not differ."""
+        before, after = _means(self.before), _means(self.after)
+        return [(before[seed], after[seed]) for seed in sorted(before.keys() & after.keys())] if self._spread else []
+
+    def judged_on_average(self, pairs: Sequence[tuple[float, float]]) -> Comparison:
+        """Compare the geometric mean of all figures of both, which spreads less than each of them.
 
         The same seeds give the same figures but for rounding, which a long training may blow up: how much their changes
         differ tells (Student's paired t). A loss that all seeds share has no such spread.
         """
-        before, after = _means(self.before), _means(self.after)
-        shared = sorted(before.keys() & after.keys())
-        if not shared or not self._spread:
-            return
-        was, is_now = (math.exp(statistics.fmean(of[seed] for seed in shared)) for of in (before, after))
-        changes = [after[seed] - before[seed] for seed in shared]
-        reach = student.ppf(1 - ALARM, len(shared) - 1) * statistics.stdev(changes) if len(shared) > 1 else 0.0
-        limit = was * math.exp(max(reach / math.sqrt(len(shared)), math.log1p(STOCHASTIC)))
-        yield self._judged(ON_AVERAGE, None, was, is_now, limit, None)
+        was, is_now = (math.exp(statistics.fmean(of)) for of in zip(*pairs, strict=True))
+        changes = [after - before for before, after in pairs]
+        reach = _once_in_a_thousand(len(pairs)) * statistics.stdev(changes) if len(pairs) > 1 else 0.0
+        limit = was * math.exp(max(reach / math.sqrt(len(pairs)), math.log1p(STOCHASTIC)))
+        return self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 
-    def _allowed(self, value: float, sigma: float, scale: float) -> float:
+    def _allowed(self, value: float, sigma: float, seeds: int, scale: float) -> float:
         if not math.isfinite(value):
             return 0.0
         if self._stochastic:
-            return max(SIGMAS * sigma, STOCHASTIC * value)
+            reach = _once_in_a_thousand(seeds) * math.sqrt(2) * sigma if seeds > 1 else 0.0
+            return max(reach, STOCHASTIC * value)
         return max(SIGMAS * sigma, COMPUTED * value) + ROUNDING * scale
 
     def _judged(
@@ -178,17 +194,23 @@ class _Group:
         return next((row.provenance["stochastic"] is True for row in rows if "stochastic" in row.provenance), False)
 
     @cached_property
-    def _spread(self) -> dict[FigureName, float]:
-        """Standard deviation over the reference's seeds of each figure that has several and differs among them."""
+    def _spread(self) -> dict[FigureName, tuple[float, int]]:
+        """Standard deviation over the reference's seeds of each figure that differs among them, and their number."""
         values: dict[FigureName, list[float]] = {}
         for row in self.before:
             for name, (value, _) in _figures(row).items():
                 if math.isfinite(value):
                     values.setdefault(name, []).append(value)
         return {
-            name: statistics.stdev(many) for name, many in values.items()
+            name: (statistics.stdev(many), len(many)) for name, many in values.items()
             if len(many) > 1 and max(many) > min(many)
         }  # fmt: skip
+
+
+@cache
+def _once_in_a_thousand(draws: int) -> float:
+    """How far a mean may lie off, in deviations that are estimated from so many draws."""
+    return float(student.ppf(1 - ALARM, draws - 1))
 
 
 def _figures(row: Result) -> dict[FigureName, tuple[float, float]]:

@@ -13,7 +13,7 @@ from simgap.baselines import arx
 from simgap.cli import main
 from simgap.records import Result, UnusableInput
 from simgap.results import store
-from simgap.results.regression import ON_AVERAGE, compare
+from simgap.results.regression import EVERYWHERE, ON_AVERAGE, compare
 
 REFERENCE = Path(__file__).parents[2] / "reports" / "results"
 GROWTH = (0.0, 0.2, -0.2, 0.1)  # of the RMSE of a network from seed to seed
@@ -73,12 +73,34 @@ def test_a_row_says_whether_its_model_is_stochastic(model, params, declared):
     assert {row.provenance["stochastic"] for row in rows} == {declared}
 
 
-def test_a_network_may_grow_by_three_sigma_of_its_seeds():
+def test_a_network_may_grow_as_far_as_one_draw_of_its_seeds_exceeds_another_once_in_a_thousand():
+    rng, alarms = np.random.default_rng(0), 0
+    for _ in range(400):
+        sizes = np.exp(0.1 * rng.standard_normal((2, 5)))
+        before, after = ([result("gru", float(size), seed) for seed, size in enumerate(of_run)] for of_run in sizes)
+        alarms += sum(one.verdict == "worse" for one in compare("smoke", before, after) if one.seed is not None)
+    assert alarms <= 10  # 4 promised of 4,000
     before = [result("gru", 1 + growth, seed) for seed, growth in enumerate(GROWTH)]
     sigma = float(np.std([1 + growth for growth in GROWTH], ddof=1))
     for share, verdict in ((0.98, "same"), (1.02, "worse")):
-        found = verdicts(before, [result("gru", 1 + 3 * sigma * share)])
+        found = verdicts(before, [result("gru", 1 + 10.215 * math.sqrt(2) * sigma * share)])  # t(0.999; 3)
         assert found["test, free_run, y", 0] == verdict
+
+
+def test_a_tenth_everywhere_is_found_where_another_processor_scatters_each_data_set():
+    rng, found, alarms = np.random.default_rng(0), 0, 0
+    for _ in range(100):
+        sizes = np.exp(0.07 * rng.standard_normal((3, 9, 5)))  # as 0.1 of the changes
+
+        def rows(sizes):
+            every = ((k, seed) for k in range(9) for seed in range(5))
+            return [replace(result("gru", float(sizes[k, seed]), seed), dataset=f"set{k}") for k, seed in every]
+
+        before, same, worse = rows(sizes[0]), rows(sizes[1]), rows(1.1 * sizes[2])
+        alarms += any(one.verdict == "worse" for one in compare("full", before, same) if one.dataset == EVERYWHERE)
+        found += any(one.verdict == "worse" for one in compare("full", before, worse))
+    assert found >= 95
+    assert alarms <= 1
 
 
 def test_a_tenth_on_all_rows_of_a_network_is_found_on_average_where_each_row_spreads_more():
