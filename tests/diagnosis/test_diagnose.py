@@ -167,3 +167,29 @@ def test_the_diagnosis_examples_of_the_command_line_are_solved(measured, effect)
 def test_every_effect_can_be_hidden_somewhere():
     everywhere = {effect for rig in RIGS for effect in suitable(rig)}
     assert everywhere == set(simgap.EFFECTS.names())
+
+
+@pytest.mark.parametrize("rig", ["cart", "stage"])
+@pytest.mark.parametrize("effect", ["load_drift", "sensor_drift"])
+def test_a_load_and_a_sensor_that_drift_in_a_line_are_told_apart(rig, effect):
+    assert [cause.effect for cause in diagnose(hide(rig, {effect: 1.0}, seed=3)).findings.causes] == [effect]
+
+
+def test_a_load_that_comes_and_goes_in_every_record_is_named():
+    rng, dt, records = np.random.default_rng(0), 0.1, []
+    for k in range(12):
+        u, v = np.repeat(rng.uniform(-2, 2, 60), 5), np.zeros(300)
+        load = 1.5 * rng.standard_normal() * np.sin(np.pi * np.arange(300) / 300)
+        for n in range(299):
+            v[n + 1] = v[n] + dt * (u[n] + load[n] - 0.8 * v[n])
+        y = v + 0.02 * v.std() * rng.standard_normal(300)
+        records.append(Experiment(f"e{k}", u[:, None], y[:, None], dt))
+    channels = Channels((Channel("u"),), (Channel("v", kind="velocity", kind_from="written"),))
+    training = TrainingSet(tuple(records[:6]), tuple(records[6:9]), 10, channels)
+    found = diagnose(Dataset("wandering", training, tuple(records[9:]), 10, channels)).findings
+    assert [cause.effect for cause in found.causes] == ["load_drift"]
+
+
+def test_a_disturbance_of_the_same_phase_in_every_record_is_no_swing_of_the_plant():
+    found = diagnose(hide("cart", {"periodic_disturbance": 1.0}, noise=0.05)).findings
+    assert [cause.effect for cause in found.causes] == ["periodic_disturbance"]
