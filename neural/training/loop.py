@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -80,9 +80,11 @@ def optimiser(net: nn.Module, recipe: Recipe) -> torch.optim.Adam:
     return torch.optim.Adam([g for g in groups if g["params"]], lr=recipe.learning_rate, fused=True)
 
 
-def exact_on_a_gpu() -> AbstractContextManager[None]:
+@contextmanager
+def exact_on_a_gpu() -> Iterator[None]:
     """Let cuDNN compute in single precision, as a CPU does, not in TF32; and the same each time from the same seed."""
-    return torch.backends.cudnn.flags(enabled=True, deterministic=True, allow_tf32=False)
+    with torch.backends.cudnn.flags(enabled=True, deterministic=True, allow_tf32=False):
+        yield
 
 
 @exact_on_a_gpu()
