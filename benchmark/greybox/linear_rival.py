@@ -96,8 +96,8 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     plain, chosen, n_init = selection.baseline, selection.trial.estimate, selection.baseline.n_init
     if not plain.orders or all(term.effect.visible_in_readings for term in chosen.plant.terms):
         return None
-    with_effects = block_errors(chosen, plain.valid, n_init, plain.train)
-    rivals = [(with_effects - block_errors(fit, plain.valid, n_init, plain.train), fit) for fit in plain.orders]
+    with_effects = block_errors(chosen, plain.valid, n_init)
+    rivals = [(with_effects - block_errors(fit, plain.valid, n_init), fit) for fit in plain.orders]
     gain, best = max(rivals, key=_mean_gain)
     if not in_most(gain):
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
