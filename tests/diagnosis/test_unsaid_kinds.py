@@ -35,16 +35,12 @@ def told(answer):
     return answer.verdict, [cause.effect for cause in answer.findings.effects][:1]
 
 
-NOT_YET = pytest.mark.xfail(reason="on a number of another order a drift of the sensor looks like one of the load")
 # Every third case, those of the youngest effect last, so that the others stay the same ones.
 SAMPLE = [case for case in sorted(CASES, key=lambda case: case[1] == "load_drift")[::3] if case not in ASKED]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("rig", "effect"),
-    [pytest.param(*case, marks=NOT_YET if case == ("tank", "load_drift") else ()) for case in SAMPLE],
-)
+@pytest.mark.parametrize(("rig", "effect"), SAMPLE)
 def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
     data = hide(rig, {effect: 1.0} if effect else {}, 0.05, seed=7)
     assert told(diagnose(without_card(data), views_too=False)) == told(diagnose(data, views_too=False))
