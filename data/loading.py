@@ -136,9 +136,7 @@ def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Data
         return load_registered(source)
     if not isinstance(source, str | os.PathLike):
         return None
-    if os.path.isdir(source):  # noqa: PTH112  # unlike Path.is_dir it never raises, whatever the text
-        if not is_described(Path(source)):
-            return None
+    if is_described(Path(source)):
         _refuse_columns(choices, f"folder {Path(source)}")
         return load_folder(Path(source), simulated)
     if not os.path.exists(source):  # noqa: PTH110
@@ -166,7 +164,7 @@ def _nowhere(source: str) -> str:
 
 def read_tables(source: Any, choices: Choices) -> list[Table]:
     """Read a DataFrame, a file, or all logs of a folder, whose columns are the same. Raises UnusableInput."""
-    if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112
+    if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112  # it never raises
         return [read_table(file, choices) for file in logs_of(Path(source))]
     return [read_table(source, choices)]
 

@@ -30,7 +30,7 @@ SIMULATED = {"sim", "simulated", "simulation"}
 
 def look(source: str) -> Look:
     """Read what a data set, a folder or a file holds. Raises UnusableInput."""
-    if source in DATASETS or (Path(source).is_dir() and is_described(Path(source))):
+    if source in DATASETS or is_described(Path(source)):
         return _of_dataset(read(source).dataset)
     return _of_logs(read_tables(source, Choices()))
 
