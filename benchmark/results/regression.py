@@ -157,12 +157,18 @@ class _Group:
         """Compare the geometric mean of all figures of both, which spreads less than each of them.
 
         The same seeds give the same figures but for rounding, which a long training may blow up: how much their changes
-        differ tells (Student's paired t). A loss that all seeds share has no such spread.
+        differ tells (Student's paired t). A loss that all seeds share has no such spread. One seed alone does not tell;
+        it may have become another of the reference's.
         """
         was, is_now = (math.exp(statistics.fmean(of)) for of in zip(*pairs, strict=True))
         changes = [after - before for before, after in pairs]
-        reach = _once_in_a_thousand(len(pairs)) * statistics.stdev(changes) if len(pairs) > 1 else 0.0
-        limit = was * math.exp(max(reach / math.sqrt(len(pairs)), math.log1p(STOCHASTIC)))
+        draws = list(_means(self.before).values())
+        reach = 0.0
+        if len(changes) > 1:
+            reach = _once_in_a_thousand(len(changes)) * statistics.stdev(changes) / math.sqrt(len(changes))
+        elif len(draws) > 1:
+            reach = _once_in_a_thousand(len(draws)) * statistics.stdev(draws) * math.sqrt(2)
+        limit = was * math.exp(max(reach, math.log1p(STOCHASTIC)))
         return self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 
     def _allowed(self, value: float, sigma: float, seeds: int, scale: float) -> float:

@@ -115,11 +115,15 @@ def test_a_tenth_on_all_rows_of_a_network_is_found_on_average_where_each_row_spr
     assert ON_AVERAGE in {one.figure for one in wrong}
 
 
-@pytest.mark.parametrize("seeds", [1, 3])
-def test_a_tenth_is_found_however_far_the_seeds_of_the_reference_spread(seeds):
+def test_a_tenth_is_found_however_far_the_seeds_of_the_reference_spread():
     before = [result("gru", size, seed) for seed, size in enumerate((0.5, 1.0, 2.0))]
-    after = [replace(row, metrics=result("gru", 1.1 * row.metrics["y"]["rmse"]).metrics) for row in before[:seeds]]
+    after = [replace(row, metrics=result("gru", 1.1 * row.metrics["y"]["rmse"]).metrics) for row in before]
     assert ON_AVERAGE in {one.figure for one in compare("smoke", before, after) if one.verdict == "worse"}
+
+
+def test_one_seed_on_one_data_set_may_have_become_another_seed_of_the_reference():
+    before = [result("gru", size, seed) for seed, size in enumerate((0.8, 1.0, 1.2))]
+    assert not [one for one in compare("smoke", before, [result("gru", 1.2)]) if one.verdict == "worse"]
 
 
 def test_seeds_that_another_processor_leads_astray_are_no_loss_on_average():
