@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 
+from simgap.neural.training import attention_exports
+from simgap.neural.training.attention import Attending
 from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
@@ -74,30 +77,34 @@ class _Graph:
                 z = self.add("Concat", *(self.block(branch, x) for branch in block.blocks), axis=2)
                 narrow = self.add("Relu", self.dense(block.narrow, z))
                 return self.add("Add", z, self.dense(block.wide, narrow))
-        return self.linear(block, x)
+        return self.part(block, x)
 
-    def linear(self, block: Any, x: str) -> str:
-        """Add a block of `linear_blocks`."""
-        match block:
-            case Stacked():
-                for part in block.blocks:
-                    x = self.block(part, x)
-                return x
-            case Entry():
-                return self.entry(block, x)
-            case Static():
-                inner = self.add("Tanh", self.dense(block.inner, x))
-                return self.add("Add", x, self.dense(block.outer, inner))
-            case Lru():
-                return self.lru(block, x)
-            case Filtered():
-                return self.filtered(block, x)
-            case StateSpace():
-                return self.state_space(block, x)
-        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
+    def part(self, block: Any, x: str) -> str:
+        """Add a block of a network that is no network of the paper."""
+        if isinstance(block, Stacked):
+            for part in block.blocks:
+                x = self.block(part, x)
+            return x
+        adders: dict[type, Callable[[Any, str], str]] = {
+            Entry: self.entry, Static: self.static, Lru: self.lru, Filtered: self.filtered,
+            StateSpace: self.state_space, Attending: self.attending,
+        }  # fmt: skip
+        if type(block) not in adders:
+            raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
+        return adders[type(block)](block, x)
+
+    def static(self, block: Static, x: str) -> str:
+        inner = self.add("Tanh", self.dense(block.inner, x))
+        return self.add("Add", x, self.dense(block.outer, inner))
 
     def dense(self, layer: Any, x: str) -> str:
         return self.add("Add", self.add("MatMul", x, self.weight(layer.weight.t())), self.weight(layer.bias))
+
+    def attending(self, block: Attending, x: str) -> str:
+        return attention_exports.add(self, block, x)
+
+    def normed(self, layer: Any, x: str) -> str:
+        return self.add("LayerNormalization", x, self.weight(layer.weight), self.weight(layer.bias), epsilon=layer.eps)
 
     def recurrence(self, layer: Any, x: str) -> str:
         operator, order, attributes = RECURRENT[type(layer)]

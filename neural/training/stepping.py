@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
-from simgap.neural.training import steps
+from simgap.neural.training import attention_exports, steps
+from simgap.neural.training.attention import Attending
 from simgap.neural.training.blocks import Headed, Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual
 from simgap.neural.training.linear_blocks import Entry, Filtered, Lru, Stacked, Static
@@ -23,7 +25,7 @@ RECURRENT: dict[type, tuple[str, int]] = {Srnn: ("rnn", 1), Gru: ("gru", 1), Lst
 LAYERS = (
     steps.sigmoid, steps.weighted, steps.dense, steps.rnn, steps.gru, steps.lstm, steps.remember, steps.convolution,
     steps.mean_of_two, steps.add, steps.copy, steps.gated, steps.squash, steps.gate, steps.diagonal, steps.read_off,
-    steps.section, steps.read, steps.hold,
+    steps.section, steps.read, steps.hold, steps.normed, steps.attend,
 )  # fmt: skip
 STATEFUL = '''\
 def step(s: list, u: list, y: list):
@@ -105,28 +107,36 @@ class _Writer:
                 return x, nx
             case Parallel():
                 return self.parallel(block, x, nx)
-        return self.linear(block, x, nx)
+        return self.part(block, x, nx)
 
-    def linear(self, block: Any, x: str, nx: int) -> tuple[str, int]:
-        """Write a block of `linear_blocks`."""
-        match block:
-            case Stacked():
-                for part in block.blocks:
-                    x, nx = self.block(part, x, nx)
-                return x, nx
-            case Entry():
-                y = self.array(nx + block.gated)
-                self.lines.append(f"gated({x}, {nx}, {block.gated}, {y})")
-                return self.dense(block.full, y, nx + block.gated)
-            case Static():
-                return self.static(block, x, nx)
-            case Lru():
-                return self.lru(block, x, nx)
-            case Filtered():
-                return self.filtered(block, x, nx)
-            case StateSpace():
-                return self.state_space(block, x, nx)
-        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
+    def part(self, block: Any, x: str, nx: int) -> tuple[str, int]:
+        """Write a block of a network that is no network of the paper."""
+        if isinstance(block, Stacked):
+            for part in block.blocks:
+                x, nx = self.block(part, x, nx)
+            return x, nx
+        writers: dict[type, Callable[[Any, str, int], tuple[str, int]]] = {
+            Entry: self.entry, Static: self.static, Lru: self.lru, Filtered: self.filtered,
+            StateSpace: self.state_space, Attending: self.attending,
+        }  # fmt: skip
+        if type(block) not in writers:
+            raise UnusableInput(
+                f"the network has a part, {type(block).__name__}, that has no step from sample to sample"
+            )
+        return writers[type(block)](block, x, nx)
+
+    def entry(self, block: Entry, x: str, nx: int) -> tuple[str, int]:
+        y = self.array(nx + block.gated)
+        self.lines.append(f"gated({x}, {nx}, {block.gated}, {y})")
+        return self.dense(block.full, y, nx + block.gated)
+
+    def attending(self, block: Attending, x: str, nx: int) -> tuple[str, int]:
+        return attention_exports.write(self, block, x, nx)
+
+    def normed(self, layer: Any, x: str, nx: int) -> str:
+        y = self.array(nx)
+        self.lines.append(f"normed({x}, {nx}, {y}, {self.weights(layer.weight, layer.bias)})")
+        return y
 
     def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:
         ny = layer.out_features

@@ -157,3 +157,35 @@ def section(x: list, n: int, s: list, at: int, y: list, num: list, den: list):
         y[i] = num[i] * x[i] + s[at + i]
         s[at + i] = num[n + i] * x[i] - den[i] * y[i] + s[at + n + i]
         s[at + n + i] = num[2 * n + i] * x[i] - den[n + i] * y[i]
+
+
+def normed(x: list, n: int, y: list, gain: list, offset: list):
+    """y = gain (x - mean of x) / its standard deviation + offset."""
+    mean = 0.0
+    for i in range(n):
+        mean += x[i] / n
+    square = 1e-5
+    for i in range(n):
+        square += (x[i] - mean) * (x[i] - mean) / n
+    for i in range(n):
+        y[i] = gain[i] * (x[i] - mean) / math.sqrt(square) + offset[i]
+
+
+def attend(q: list, n: int, s: list, at: int, span: int, score: list, heads: int, size: int, y: list, b: list):
+    """y = sum over j of softmax_j(q k(j) / sqrt(size) + b_j) v(j), in heads of that size; s[at], .. hold k and v."""
+    for h in range(heads):
+        top = -1e300
+        for j in range(span):
+            score[j] = 0.0
+            for i in range(size):
+                score[j] += q[h * size + i] * s[at + (span - 1 - j) * 2 * n + h * size + i]
+            score[j] = score[j] / math.sqrt(size) + b[h * span + j]
+            top = max(top, score[j])
+        total = 0.0
+        for j in range(span):
+            score[j] = math.exp(score[j] - top)
+            total += score[j]
+        for i in range(size):
+            y[h * size + i] = 0.0
+            for j in range(span):
+                y[h * size + i] += score[j] / total * s[at + (span - 1 - j) * 2 * n + n + h * size + i]

@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch import nn
 
+from simgap.neural.training.attention import Attending, Attention
 from simgap.neural.training.blocks import Parallel, Pooled, Recurrences, Tcn
 from simgap.neural.training.convolution import Convolution, Residual, pooled
 from simgap.neural.training.recurrent import Gru, Lstm, Srnn, recurrent
@@ -73,11 +74,26 @@ def test_pooling_takes_the_mean_of_two_samples():
     torch.testing.assert_close(gradients(ours, parts), gradients(theirs, parts))
 
 
+def test_attention_is_a_weighted_mean_of_the_past_with_zeros_before_the_start():
+    torch.manual_seed(0)
+    layer, x = Attention(6, 2, 5).double(), torch.randn(3, 23, 6, dtype=torch.double)
+    nn.init.normal_(layer.offsets)
+    q, k, v = layer.qkv(x).unflatten(2, (3, 2, 3)).unbind(2)  # each [B, T, heads, d]
+    k, v = (nn.functional.pad(of, (0, 0, 0, 0, 4, 0)) for of in (k, v))
+    theirs = torch.zeros_like(q)
+    for t in range(23):
+        past_k, past_v = (of[:, t : t + 5].flip(1) for of in (k, v))  # delays 0 to 4
+        score = torch.einsum("bhd,bjhd->bhj", q[:, t], past_k) / 3**0.5 + layer.offsets
+        theirs[:, t] = torch.einsum("bhj,bjhd->bhd", score.softmax(2), past_v)
+    torch.testing.assert_close(layer(x), layer.out(theirs.flatten(2)))
+
+
 def blocks(window):
     return {
         "recurrent": Recurrences([recurrent(Lstm, 2, 4), recurrent(Gru, 4, 3)]),
         "pooled": Pooled(2, 4, 5, window),
         "tcn": Tcn(2, 4, 3, 4),
+        "attending": Attending(2, 2, 5, 6),
         "parallel": Parallel([Tcn(2, 4, 3, 2), Pooled(2, 3, 3, window)], 7, 5),
     }
 

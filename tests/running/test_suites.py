@@ -54,7 +54,7 @@ def test_models_that_are_left_out_must_be_known(tmp_path):
 
 NETWORKS = (
     "conv1d", "decoder", "dynonet", "encoder", "gru", "inception", "inception_regularised", "lru", "lstm",
-    "neural-ode", "srnn", "subnet", "tcn", "tcns",
+    "neural-ode", "srnn", "subnet", "tcn", "tcns", "transformer",
 )  # fmt: skip
 
 
