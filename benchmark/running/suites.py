@@ -22,8 +22,8 @@ KEYS = (
 class Entry:
     """One model of a suite: a registered name or `file.py:Class`, its parameters, its name in the results.
 
-    gpus: how many GPUs, or what part of one, a cluster sets apart for it. datasets: the only ones it runs on, where some
-    are named.
+    gpus: how many GPUs, or what part of one, a cluster sets apart for it. datasets: the only ones it runs on, if
+    some are named.
     """
 
     name: str
