@@ -126,7 +126,8 @@ class _Reader:
                 usual = {name: Entry(name) for name in MODELS if name not in without}
             else:
                 name = self._near(entry[0]) if ".py:" in entry[0] else entry[0]
-                chosen.append(Entry(name, *entry[1:], self._gpus(table), self._own_datasets(table, datasets)))
+                own = self._own_datasets(table, datasets)
+                chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table), datasets=own))
         labels = {entry.label for entry in chosen}
         return [*(entry for label, entry in usual.items() if label not in labels), *chosen]
 
