@@ -190,8 +190,17 @@ class Network(ABC):
         """Raise UnusableInput for hyper-parameters that make no sense."""
         if self.mode not in ("windowed", "stateful"):
             raise UnusableInput(f"the mode {self.mode!r} is not known; it is windowed or stateful")
-        if self.window < 8 or self.epochs < 0:
-            raise UnusableInput("a network needs a window of at least 8 samples, and no number of epochs below zero")
+        if self.window < 8:
+            raise UnusableInput("a network needs a window of at least 8 samples")
+        chosen = self.hyper_parameters()
+        for name in ("epochs", "batches", "learning_rate", "l2"):
+            if not chosen[name] >= 0:
+                raise UnusableInput(f"{name} is {chosen[name]}; it cannot be below zero")
+        for name, value in chosen.items():
+            if "dropout" in name and not 0 <= value < 1:
+                raise UnusableInput(f"{name} is {value}; give a share from 0 to below 1")
+            if name not in Network.__dataclass_fields__ and isinstance(value, int) and value < 1:
+                raise UnusableInput(f"{name} is {value}; a network needs at least 1")
         if self.device != "cpu":
             try:
                 torch.zeros(1, device=self.device)

@@ -138,7 +138,10 @@ def test_the_learning_rate_range_test_ends_where_the_loss_explodes(data):
     [
         ({"mode": "sideways"}, "the mode 'sideways' is not known"),
         ({"device": "cuda:77"}, "the device 'cuda:77' cannot be used"),
-        ({"epochs": -1}, "no number of epochs below zero"),
+        ({"epochs": -1}, "epochs is -1; it cannot be below zero"),
+        ({"learning_rate": float("nan")}, "learning_rate is nan; it cannot be below zero"),
+        ({"dropout": 1.0}, "dropout is 1.0; give a share from 0 to below 1"),
+        ({"units": 0}, "units is 0; a network needs at least 1"),
         ({"window": 500}, "longer than the window of 500 samples"),
     ],
 )
