@@ -13,6 +13,7 @@ from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.kernel_regression import KernelNarx, Regression, scaled, stacked
 from simgap.baselines.estimation.narx_error import scales
+from simgap.baselines.estimation.orders import check_limits
 from simgap.cores import one_thread
 from simgap.records import TrainingSet
 from simgap.registry import MODELS
@@ -54,6 +55,7 @@ class KernelNarxModel:
     @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
+        check_limits(self)
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)
         means, sizes, bound = scales(data.train)
         train = scaled(excerpt(data.train, EXCERPT), means, sizes)

@@ -13,6 +13,7 @@ from simgap.baselines.estimation.batches import excerpt
 from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.levenberg import minimise
 from simgap.baselines.estimation.linear import simplest
+from simgap.baselines.estimation.orders import check_limits
 from simgap.baselines.estimation.state_space_error import StateSpaceError
 from simgap.cores import one_thread
 from simgap.records import Experiment, TrainingSet
@@ -51,6 +52,7 @@ class N4sid:
     @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the order on train and valid, then estimate on both together; nothing here is random."""
+        check_limits(self)
         upper = range(EVERY + 2, self.max_order + 1, 2)
         orders = [self.order] if self.order else [*range(1, min(self.max_order, EVERY) + 1), *upper]
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]

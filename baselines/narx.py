@@ -14,6 +14,7 @@ from simgap.baselines.estimation.equation_error import check_length
 from simgap.baselines.estimation.forward_selection import forward_selection
 from simgap.baselines.estimation.monomials import monomials, regressors, values
 from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
+from simgap.baselines.estimation.orders import check_limits
 from simgap.cores import one_thread
 from simgap.records import Experiment, TrainingSet
 from simgap.registry import MODELS
@@ -43,6 +44,7 @@ class Narx:
     @one_thread()
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the terms on train and valid, then estimate on both together; nothing here is random."""
+        check_limits(self)
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)
         held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
         records = excerpt(data.train, EXCERPT)

@@ -16,7 +16,7 @@ from simgap.baselines.estimation.blocks import Blocks
 from simgap.baselines.estimation.equation_error import TooFewSamples, check_length
 from simgap.baselines.estimation.gram import rough_means
 from simgap.baselines.estimation.oe_search import oe_starts
-from simgap.baselines.estimation.orders import Orders
+from simgap.baselines.estimation.orders import Orders, check_limits
 from simgap.baselines.estimation.output_error import OutputError
 from simgap.records import Experiment, TrainingSet
 
@@ -35,6 +35,7 @@ class BlockModel(ABC):
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
+        check_limits(self)
         outputs = range(len(data.channels.outputs))
         searches = [Search(self.kind, data.train, data.valid, i, data.n_init) for i in outputs]
         chosen = [self._structure(data, search) for search in searches]

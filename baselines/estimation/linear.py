@@ -14,7 +14,7 @@ from simgap.baselines.estimation import graph, stepping
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.equation_error import TooFewSamples
 from simgap.baselines.estimation.fitted import LinearFit, Row
-from simgap.baselines.estimation.orders import Orders
+from simgap.baselines.estimation.orders import Orders, check_limits
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.estimation.residuals import residual_analysis
 from simgap.records import Channels, Experiment, TrainingSet, UnusableInput
@@ -62,6 +62,7 @@ class LinearModel(ABC):
 
         The estimate has no randomness, so the seed changes nothing.
         """
+        check_limits(self)
         ny, nu = len(data.channels.outputs), len(data.channels.inputs)
         orders, start = self.given_orders(ny, nu), None
         if orders is None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int
@@ -81,6 +82,14 @@ class Orders:
             for name, value in named.items()
             if name in ("nb", "nk") or value.any()
         }
+
+
+def check_limits(model: Any) -> None:
+    """Raise UnusableInput where a limit of a search, `max_..`, or an order that was asked for is below 1."""
+    for f in fields(model):
+        limit = getattr(model, f.name, None)
+        if (f.name.startswith("max_") or f.name == "order") and isinstance(limit, int) and limit < 1:
+            raise UnusableInput(f"{f.name} is {limit}; give a whole number from 1")
 
 
 def _spread(name: str, value: Order, shape: tuple[int, ...]) -> np.ndarray:
