@@ -61,13 +61,14 @@ def load(
     split_gaps: bool = False,
     known: Mapping[str, Any] | None = None,
 ) -> Dataset:
-    """Load a data set: a registered name, a folder, a file of one record or a pandas DataFrame.
+    """Load a data set: a registered name, a folder, a file of one record or a pandas DataFrame, or a list of these two.
 
     A name may carry parameters where its data set takes some, "gimbal-noise4-delay0.2".
     A file (CSV, .mat or .parquet) and a DataFrame are one record: `inputs` and `outputs` name its columns, with or
     without the unit that stands there. The sampling time is that of the time column or `dt` in seconds, and the record
     is split in time 60/20/20. A folder without a dataset.toml holds such files with the same columns, one record in
-    the order of their names. `kind` says what the outputs are, {"speed": "velocity"} or the kind of a single output.
+    the order of their names; a list is one in its own order. `kind` says what the outputs are, {"speed": "velocity"},
+    or the kind of a single output.
     `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap.
     `known` is what a table [plant] of a dataset.toml says of the machine, {"mass": "0.5 kg"}.
     Raises UnusableInput when the data cannot be used, and its subclass Missing when they are not at hand.
@@ -163,7 +164,9 @@ def _nowhere(source: str) -> str:
 
 
 def read_tables(source: Any, choices: Choices) -> list[Table]:
-    """Read a DataFrame, a file, or all logs of a folder, whose columns are the same. Raises UnusableInput."""
+    """Read a DataFrame, a file, some of these, or all logs of a folder, with the same columns. Raises UnusableInput."""
+    if isinstance(source, list | tuple):
+        return [read_table(log, choices) for log in source]
     if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112  # it never raises
         return [read_table(file, choices) for file in logs_of(Path(source))]
     return [read_table(source, choices)]
@@ -176,8 +179,10 @@ def read_table(source: Any, choices: Choices) -> Table:
 
         return table_of(source)
     path = Path(source)
+    if not os.path.exists(path):  # noqa: PTH110
+        raise UnusableInput(_nowhere(os.fspath(source)))
     if not path.is_file():  # a pipe would never end
-        raise UnusableInput(f"{path} is missing or no ordinary file; give a CSV file")
+        raise UnusableInput(f"{path} is no ordinary file; give a CSV file")
     match path.suffix.lower():
         case ".mat":
             from simgap.data.formats.mat_files import read_mat

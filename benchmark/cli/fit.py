@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from simgap.cli.options import (
+    Data,
     Inputs,
     Json,
     KindOf,
@@ -36,7 +37,7 @@ MANY = 8
 
 def fit(
     model: Annotated[str, typer.Argument(help="Name of a model, or path/to/file.py:Class.")],
-    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    data: Data,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,

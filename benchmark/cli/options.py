@@ -15,6 +15,9 @@ from simgap.records import UnusableInput
 if TYPE_CHECKING:
     from simgap.data import Reading
 
+Data = Annotated[
+    list[str], typer.Argument(help="Name of a data set, a folder, a CSV file, or several logs of one machine.")
+]
 Inputs = Annotated[list[str] | None, typer.Option("--input", help="Input column of a CSV file; repeatable.")]
 Outputs = Annotated[list[str] | None, typer.Option("--output", help="Output column; repeatable.")]
 SamplingTime = Annotated[float | None, typer.Option("--dt", help="Sampling time of a CSV file in seconds.")]
@@ -84,7 +87,7 @@ def parse_limits(option: str, given: Sequence[str], count: int) -> Any:
 
 
 def read_data(
-    data: str,
+    data: str | Sequence[str],
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
     dt: float | None = None,
@@ -100,7 +103,8 @@ def read_data(
 
     kinds, machine = parse_kinds(kind or ()), parse_known(known or ())
     columns = (inputs or (), outputs or ())
-    reading = read(data, *columns, dt, None, kinds, resample, split_gaps, machine, simulated or ())
+    source = data if isinstance(data, str) or len(data) > 1 else data[0]
+    reading = read(source, *columns, dt, None, kinds, resample, split_gaps, machine, simulated or ())
     if str(reading):
         typer.echo(str(reading))
     return reading

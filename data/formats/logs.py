@@ -1,4 +1,4 @@
-"""Several logs of one machine, as files with the same columns in one folder, without a dataset.toml."""
+"""Several logs of one machine with the same columns, as files that are named or in a folder without a dataset.toml."""
 
 from __future__ import annotations
 
@@ -47,16 +47,22 @@ def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:
     records = [record_of(table, choices) for table in tables]
     if len(records) == 1:
         return records[0]
-    first, pieces = records[0], []
-    for table, record in zip(tables, records, strict=True):
+    first, pieces, names = records[0], [], _names([table.source for table in tables])
+    for table, record, name in zip(tables, records, names, strict=True):
         _check_alike(tables[0], first, table, record)
-        name = Path(table.source).stem
         for x in record.pieces:
             pieces.append(
                 replace(x, name=name if len(record.pieces) == 1 else f"{name}_{x.name}", dt=first.pieces[0].dt)
             )
-    said = f"{len(tables)} logs, parted 60/20/20 in the order of their names"
-    return OneRecord(str(Path(tables[0].source).parent), tuple(pieces), first.channels, (said, *first.said))
+    said = f"{len(tables)} logs, parted 60/20/20 in this order: {', '.join(names[:3])}{', ..' if names[3:] else ''}"
+    folder = Path(tables[0].source).resolve().parent
+    return OneRecord(str(folder), tuple(pieces), first.channels, (said, *first.said))
+
+
+def _names(sources: Sequence[str]) -> list[str]:
+    """Name logs by their files; with a number before it where two would be called the same."""
+    names = [Path(source).stem for source in sources]
+    return names if len(set(names)) == len(names) else [f"{i}_{name}" for i, name in enumerate(names, 1)]
 
 
 def _check_alike(table: Table, record: OneRecord, other: Table, its: OneRecord) -> None:

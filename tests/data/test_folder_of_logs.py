@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from simgap.baselines.arx import Arx
+from simgap.cli import main
 from simgap.data import load
 from simgap.data.loading import read, read_recordings
 
@@ -32,7 +33,22 @@ def test_one_log_in_a_folder_is_the_record_of_that_file(logs):
 
 
 def test_what_was_inferred_says_how_many_logs_there_are(logs):
-    assert "10 logs, parted 60/20/20 in the order of their names" in read(logs, **COLUMNS).said
+    assert "10 logs, parted 60/20/20 in this order: log1, log2, log3, .." in read(logs, **COLUMNS).said
+
+
+def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsys):
+    files = [str(logs / f"log{k}.csv") for k in (5, 2, 7, 1, 9)]
+    data = load(files, **COLUMNS)
+    assert [*names(data.training.train), *names(data.training.valid), *names(data.test)] == [
+        "log5", "log2", "log7", "log1", "log9"
+    ]  # fmt: skip
+    assert main(["fit", "arx", *files, "--input", "u", "--output", "phi"]) == 0
+    assert "5 logs, parted 60/20/20 in this order: log5, log2, log7, .." in capsys.readouterr().out
+    assert names(load([*files[:4], files[0]], **COLUMNS).test) == ["5_log5"]
+
+
+def test_a_named_log_that_is_not_there_is_said_to_be_missing(logs, refused):
+    assert f"there is no file {logs / 'log99.csv'}" in refused([logs / "log1.csv", logs / "log99.csv"], **COLUMNS)
 
 
 def test_files_of_other_endings_beside_the_csv_files_and_hidden_ones_are_no_logs(logs):
