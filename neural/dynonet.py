@@ -20,12 +20,10 @@ class DynoNet(Network):
 
     The paper's matrix of transfer functions is here one for each channel, between fully connected layers. Stateful, it
     has a recipe of its own and longer pieces, as chosen on the validation parts of Wiener-Hammerstein, Silverbox and
-    the tanks.
+    the tanks; its error on the first still falls after 480 epochs.
     """
 
-    stateful: ClassVar = replace(
-        STATEFUL, epochs=160, learning_rate=1e-2, patience=8, early_stop=40
-    )  # fmt: skip
+    stateful: ClassVar = replace(STATEFUL, epochs=800, learning_rate=1e-2, patience=8, early_stop=40)
     free: ClassVar[int] = 300
 
     channels: int = 8

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from simgap.neural.training.blocks import Block, Headed, Recurrences
-from simgap.neural.training.network import Network
+from simgap.neural.training.network import STATEFUL, Network
 from simgap.neural.training.recurrent import Srnn, recurrent
 from simgap.registry import MODELS
 
@@ -13,7 +14,13 @@ from simgap.registry import MODELS
 @MODELS.register("srnn")
 @dataclass
 class SRNN(Network):
-    """SRNN(units) - FC(ny); model 1 of the paper, which gives no width: 32 units here."""
+    """SRNN(units) - FC(ny); model 1 of the paper, which gives no width: 32 units here.
+
+    Stateful, it learns more slowly and for longer than the others: without gates, larger steps throw it back. On the
+    validation part of Wiener-Hammerstein 1e-3 leaves half the error of 3e-3, from which 300 epochs are not enough.
+    """
+
+    stateful: ClassVar = replace(STATEFUL, epochs=1200, learning_rate=1e-3)
 
     units: int = 32
 
