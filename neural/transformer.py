@@ -17,8 +17,8 @@ from simgap.registry import MODELS
 class Transformer(Network):
     """FC(units) - layers x [attention to `span` samples, network at each sample] - FC(ny).
 
-    It holds no state: its outputs depend on the last layers x (span - 1) samples and no others. What a plant keeps for
-    longer, an integrator above all, is beyond it.
+    It holds no state: an output depends on its own sample and on layers x (span - 1) before it, and on nothing older.
+    What a plant keeps for longer, an integrator above all, is beyond it.
     """
 
     units: int = 24
