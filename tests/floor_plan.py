@@ -48,6 +48,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"app", "contract", "experiment_design", "exports", "findings", "data", "greybox", "diagnosis", "recovery"}
     | {"reports", "saved"}
     | {"simgap"},
+    "__main__": {"cli"},
 }
 
 

@@ -16,6 +16,17 @@ def test_import_simgap_loads_nothing_heavy():
     assert not HEAVY & set(done.stdout.split())
 
 
+def test_python_runs_the_command_line_as_a_module():
+    done = subprocess.run(
+        [sys.executable, "-m", "simgap", "list", "suites"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "full" in done.stdout
+    wrong = subprocess.run([sys.executable, "-m", "simgap", "lst"], capture_output=True, text=True, check=False)
+    assert wrong.returncode == 2
+    assert wrong.stderr.startswith("simgap: ")
+
+
 @pytest.mark.parametrize("arguments", ["", "--help", "--version", "list models", "list datasets", "list suites"])
 def test_a_command_that_fits_nothing_does_not_import_torch(arguments, tmp_path):
     # Nothing catches this, whereas an ImportError could be taken for a missing dependency.
