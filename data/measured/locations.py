@@ -55,6 +55,8 @@ class Source:
             return self.build(folder)
         except UnusableInput:
             raise
+        except ImportError as error:
+            raise UnusableInput(f"{self.name} cannot be read: a package is missing ({one_line(error)})") from error
         except Exception as error:  # scipy's reader fails in any way on a broken .mat file
             raise UnusableInput(
                 f"{self.name}: the files in {folder} cannot be read ({one_line(error)}); "

@@ -1,6 +1,7 @@
 """The contract of every registered data set, and the facts of the measured ones."""
 
 import inspect
+import sys
 
 import numpy as np
 import pytest
@@ -217,6 +218,15 @@ def test_a_broken_file_of_a_measured_set_is_refused_in_one_line(made):
         load("emps")
     assert not isinstance(caught.value, Missing)
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.usefixtures("made")
+def test_a_package_that_is_missing_is_no_broken_file(monkeypatch):
+    monkeypatch.setitem(sys.modules, "nonlinear_benchmarks", None)
+    with pytest.raises(
+        UnusableInput, match=r"^emps cannot be read: a package is missing \(.*nonlinear_benchmarks.*\)$"
+    ):
+        load("emps")
 
 
 @pytest.mark.parametrize("name", PACKAGE + DAISY)
