@@ -61,7 +61,7 @@ def load(
     split_gaps: bool = False,
     known: Mapping[str, Any] | None = None,
 ) -> Dataset:
-    """Load a data set: a registered name, a folder, a file of one record or a pandas DataFrame, or a list of these two.
+    """Load a data set: a registered name, a folder, a file of one record, a pandas DataFrame, or a list of files.
 
     A name may carry parameters where its data set takes some, "gimbal-noise4-delay0.2".
     A file (CSV, .mat or .parquet) and a DataFrame are one record: `inputs` and `outputs` name its columns, with or
@@ -140,8 +140,6 @@ def _known(source: Any, choices: Choices, simulated: Sequence[str] = ()) -> Data
     if is_described(Path(source)):
         _refuse_columns(choices, f"folder {Path(source)}")
         return load_folder(Path(source), simulated)
-    if not os.path.exists(source):  # noqa: PTH110
-        raise UnusableInput(_nowhere(os.fspath(source)))
     return None
 
 
@@ -164,12 +162,28 @@ def _nowhere(source: str) -> str:
 
 
 def read_tables(source: Any, choices: Choices) -> list[Table]:
-    """Read a DataFrame, a file, some of these, or all logs of a folder, with the same columns. Raises UnusableInput."""
+    """Read a DataFrame, a file, a list of files, or all logs of a folder. Raises UnusableInput."""
     if isinstance(source, list | tuple):
-        return [read_table(log, choices) for log in source]
+        return [read_table(log, choices) for log in _each_once(source)]
     if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112  # it never raises
         return [read_table(file, choices) for file in logs_of(Path(source))]
     return [read_table(source, choices)]
+
+
+def _each_once(logs: Sequence[Any]) -> list[Path]:
+    """Check that logs are files, none of them twice. Raises UnusableInput."""
+    files: list[Path] = []
+    for log in map(Path, logs):
+        if log.is_dir() or (not log.exists() and is_registered(str(log))):
+            raise UnusableInput(
+                f"of several logs each must be a file; {log} is a folder or a data set, so name it alone"
+            )
+        if log.exists() and any(log.samefile(file) for file in files):
+            raise UnusableInput(f"{log} is named twice, and would be in training and test; name each log once")
+        files.append(log)
+    if not files:
+        raise UnusableInput("there is no log in the list")
+    return files
 
 
 def read_table(source: Any, choices: Choices) -> Table:

@@ -22,7 +22,7 @@ class Transformer(Network):
     """
 
     units: int = 24
-    heads: int = 2
+    heads: int = 1
     layers: int = 3
     span: int = 32
 

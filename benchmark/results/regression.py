@@ -25,6 +25,7 @@ SIGMAS = 3.0  # of the seeds of a model that computes, which rounding tells apar
 ALARM = 0.001  # chance of one where nothing but rounding changed
 # Share of the spread of what was measured below which an RMSE is rounding.
 ROUNDING = 1e-9
+ENDLESS = 300.0  # logarithm of a growth that few seeds cannot tell from their own spread
 ON_AVERAGE = "on average"
 EVERYWHERE = "all data sets"
 
@@ -75,7 +76,7 @@ def check(new: str | Path, reference: str | Path = Path("reports") / "results") 
 
     because a long training makes another draw of every seed on another processor. What that hides shows on average: the
     geometric mean of the RMSEs per model and data set, and over all data sets, is worse by more than 5 % and more than
-    the changes of the same seeds scatter (Student's paired t). A row of the reference is missing when the new results
+    the changes of the same seeds scatter (Student's paired t); of a single one, more than two draws may. A row of the reference is missing when the new results
     lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
@@ -157,8 +158,8 @@ class _Group:
         """Compare the geometric mean of all figures of both, which spreads less than each of them.
 
         The same seeds give the same figures but for rounding, which a long training may blow up: how much their changes
-        differ tells (Student's paired t). A loss that all seeds share has no such spread. One seed alone does not tell;
-        it may have become another of the reference's.
+        differ tells (Student's paired t). A loss that all seeds share has no such spread. One seed tells no spread: it
+        may lose what one draw of the reference's seeds loses against another.
         """
         was, is_now = (math.exp(statistics.fmean(of)) for of in zip(*pairs, strict=True))
         changes = [after - before for before, after in pairs]
@@ -168,7 +169,7 @@ class _Group:
             reach = _once_in_a_thousand(len(changes)) * statistics.stdev(changes) / math.sqrt(len(changes))
         elif len(draws) > 1:
             reach = _once_in_a_thousand(len(draws)) * statistics.stdev(draws) * math.sqrt(2)
-        limit = was * math.exp(max(reach, math.log1p(STOCHASTIC)))
+        limit = was * math.exp(min(max(reach, math.log1p(STOCHASTIC)), ENDLESS))
         return self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 
     def _allowed(self, value: float, sigma: float, seeds: int, scale: float) -> float:

@@ -22,15 +22,13 @@ KEYS = (
 class Entry:
     """One model of a suite: a registered name or `file.py:Class`, its parameters, its name in the results.
 
-    gpus: how many GPUs, or what part of one, a cluster sets apart for it. datasets: the only ones it runs on, if
-    some are named.
+    gpus: how many GPUs, or what part of one, a cluster sets apart for it.
     """
 
     name: str
     params: dict[str, Any] = field(default_factory=dict)
     label: str = ""
     gpus: float = 0.0
-    datasets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.label:
@@ -79,12 +77,11 @@ class _Reader:
 
     def suite(self) -> Suite:
         self._refuse_unknown(self.table, KEYS)
-        datasets = self._datasets()
         suite = Suite(
             name=self.path.stem,
             title=self._get("title", str, self.path.stem),
-            datasets=datasets,
-            models=tuple(self._models(datasets)),
+            datasets=self._datasets(),
+            models=tuple(self._models()),
             tasks=tuple(str(task) for task in self._get("tasks", list, list(USUAL))),
             seeds=self._get("seeds", int, 1),
             timeout=float(self._get("timeout", (int, float), Suite.timeout)),
@@ -106,9 +103,9 @@ class _Reader:
             raise UnusableInput(f'{self.path}: without goes with datasets = "all" only')
         if isinstance(given, str) or not all(isinstance(name, str) for name in given):
             raise UnusableInput(f'{self.path}: datasets must be "all" or a list of names')
-        return tuple(map(self._at_hand, given))
+        return tuple(name if name in DATASETS else self._near(name) for name in given)
 
-    def _models(self, datasets: tuple[str, ...]) -> Iterable[Entry]:
+    def _models(self) -> Iterable[Entry]:
         """The entries of the tables; one with the name of a model that `all` has brought takes its place."""
         given = self._get("models", (list, str), "all")
         without = self._left_out("without_models", MODELS, "model")
@@ -118,7 +115,7 @@ class _Reader:
         usual: dict[str, Entry] = {}
         chosen: list[Entry] = []
         for table in self._without_groups(tables):
-            self._refuse_unknown(table, ("name", "params", "label", "gpus", "datasets"))
+            self._refuse_unknown(table, ("name", "params", "label", "gpus"))
             entry: tuple[Any, ...] = (table.get("name", ""), table.get("params", {}), table.get("label", ""))
             if not entry[0] or [type(part) for part in entry] != [str, dict, str]:
                 raise UnusableInput(f"{self.path}: a model needs a name, a table params and a text as label")
@@ -126,8 +123,7 @@ class _Reader:
                 usual = {name: Entry(name) for name in MODELS if name not in without}
             else:
                 name = self._near(entry[0]) if ".py:" in entry[0] else entry[0]
-                own = self._own_datasets(table, datasets)
-                chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table), datasets=own))
+                chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table)))
         labels = {entry.label for entry in chosen}
         return [*(entry for label, entry in usual.items() if label not in labels), *chosen]
 
@@ -174,16 +170,6 @@ class _Reader:
         if not isinstance(gpus, int | float) or isinstance(gpus, bool) or not 0 <= gpus <= 64:
             raise UnusableInput(f"{self.path}: gpus is {gpus!r}; give a number such as 0.25")
         return float(gpus)
-
-    def _own_datasets(self, table: dict[str, Any], datasets: tuple[str, ...]) -> tuple[str, ...]:
-        given = table.get("datasets", [])
-        own = tuple(self._at_hand(name) for name in given) if isinstance(given, list) else None
-        if own is None or not set(own) <= set(datasets):
-            raise UnusableInput(f"{self.path}: datasets of a model is {given!r}; give a list of those of the suite")
-        return own
-
-    def _at_hand(self, name: Any) -> str:
-        return str(name) if name in DATASETS else self._near(str(name))
 
     def _near(self, name: str) -> str:
         """`name`, a path or `file.py:Class`, from the suite's own folder if there is such a file."""

@@ -55,7 +55,7 @@ def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:
                 replace(x, name=name if len(record.pieces) == 1 else f"{name}_{x.name}", dt=first.pieces[0].dt)
             )
     said = f"{len(tables)} logs, parted 60/20/20 in this order: {', '.join(names[:3])}{', ..' if names[3:] else ''}"
-    folder = Path(tables[0].source).resolve().parent
+    folder = Path(os.path.abspath(tables[0].source)).parent  # noqa: PTH100  # which keeps the name of a link
     return OneRecord(str(folder), tuple(pieces), first.channels, (said, *first.said))
 
 

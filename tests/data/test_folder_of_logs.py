@@ -1,5 +1,7 @@
 """A folder of logs without a description: one record in the order of the names of its files."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -44,7 +46,26 @@ def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsy
     ]  # fmt: skip
     assert main(["fit", "arx", *files, "--input", "u", "--output", "phi"]) == 0
     assert "5 logs, parted 60/20/20 in this order: log5, log2, log7, .." in capsys.readouterr().out
-    assert names(load([*files[:4], files[0]], **COLUMNS).test) == ["5_log5"]
+    (logs / "old").mkdir()
+    shutil.copy(files[0], logs / "old" / "log5.csv")
+    assert names(load([*files, str(logs / "old" / "log5.csv")], **COLUMNS).training.train)[:2] == ["1_log5", "2_log2"]
+
+
+@pytest.mark.parametrize(
+    ("others", "said"),
+    [
+        (["log1.csv"], "log1.csv is named twice, and would be in training and test; name each log once"),
+        (["../logs/log1.csv"], "log1.csv is named twice"),
+        (["../logs"], "is a folder or a data set, so name it alone"),
+    ],
+)
+def test_what_is_no_list_of_different_files_is_refused(logs, refused, others, said):
+    assert said in refused([logs / "log1.csv", *(logs / other for other in others)], **COLUMNS)
+
+
+def test_data_sets_and_nothing_at_all_are_no_list_of_logs(refused):
+    assert "gimbal_short is a folder or a data set, so name it alone" in refused(["gimbal_short"])
+    assert refused([]) == "there is no log in the list"
 
 
 def test_a_named_log_that_is_not_there_is_said_to_be_missing(logs, refused):

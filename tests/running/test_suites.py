@@ -1,10 +1,8 @@
 import pytest
 
 from simgap.data.named import is_registered
-from simgap.records import Channels, UnusableInput
+from simgap.records import UnusableInput
 from simgap.registry import DATASETS, MODELS
-from simgap.running import planning
-from simgap.running.jobs import Card, LoadArguments
 from simgap.running.suites import Entry, load_suite, suite_names
 
 
@@ -117,24 +115,6 @@ def test_all_models_and_one_more_fit_in_one_suite(tmp_path):
     assert [entry.label for entry in load_suite(written(tmp_path, text)).models] == [*MODELS, "ARX321"]
 
 
-def test_a_model_runs_only_on_the_data_sets_that_its_table_names(tmp_path):
-    text = """
-    datasets = ["gimbal_short", "gimbal"]
-    [[models]]
-    name = "arx"
-    datasets = ["gimbal"]
-    [[models]]
-    name = "fir"
-    """
-    suite = load_suite(written(tmp_path, text))
-    data = [(LoadArguments(name), Card(name, (), Channels((), ()), "")) for name in suite.datasets]
-    jobs = planning.plan(suite, suite.models, data, {})
-    pairs = [("gimbal_short", "fir"), ("gimbal", "arx"), ("gimbal", "fir")]
-    assert [(job.card.name, job.entry.name) for job in jobs] == pairs
-    with pytest.raises(UnusableInput, match=r"^suite mine has no model for gimbal_short$"):
-        planning.plan(suite, suite.models[:1], data[:1], {})
-
-
 def test_paths_in_a_suite_count_from_its_file(tmp_path):
     (tmp_path / "my_data").mkdir()
     (tmp_path / "my_model.py").touch()
@@ -162,8 +142,6 @@ def test_paths_in_a_suite_count_from_its_file(tmp_path):
         ('datasets = ["gimbal"]\nwithout = ["gimbal"]', 'without goes with datasets = "all" only'),
         ('models = ["arx"]', "models must be"),
         ('[[models]]\nlabel = "x"', "needs a name"),
-        ('datasets = ["gimbal"]\n[[models]]\nname = "arx"\ndatasets = ["ced"]', "datasets of a model is ['ced']"),
-        ('datasets = ["gimbal"]\n[[models]]\nname = "arx"\ndatasets = "gimbal"', "datasets of a model is 'gimbal'"),
         ('[[models]]\nname = "arx"\nparams = 3', "needs a name"),
         ('[[models]]\nname = "arx"\nparam = {}', "unknown key 'param'"),
         ("groups = 1", "groups must be a table"),
