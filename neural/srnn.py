@@ -16,8 +16,8 @@ from simgap.registry import MODELS
 class SRNN(Network):
     """SRNN(units) - FC(ny); model 1 of the paper, which gives no width: 32 units here.
 
-    Stateful, it learns more slowly and for longer than the others: without gates, larger steps throw it back. On the
-    validation part of Wiener-Hammerstein 1e-3 leaves half the error of 3e-3, from which 300 epochs are not enough.
+    Stateful, it takes smaller steps than the others, and more of them. On the validation part of Wiener-Hammerstein a
+    rate of 1e-3 ends at half the error of 3e-3, but needs more than 300 epochs.
     """
 
     stateful: ClassVar = replace(STATEFUL, epochs=1200, learning_rate=1e-3)

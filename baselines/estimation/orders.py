@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -86,10 +86,9 @@ class Orders:
 
 def check_limits(model: Any) -> None:
     """Raise UnusableInput where a limit of a search, `max_..`, or an order that was asked for is below 1."""
-    for f in fields(model):
-        limit = getattr(model, f.name, None)
-        if (f.name.startswith("max_") or f.name == "order") and isinstance(limit, int) and limit < 1:
-            raise UnusableInput(f"{f.name} is {limit}; give a whole number from 1")
+    for name, limit in vars(model).items():
+        if (name.startswith("max_") or name == "order") and isinstance(limit, int) and limit < 1:
+            raise UnusableInput(f"{name} is {limit}; give a whole number from 1")
 
 
 def _spread(name: str, value: Order, shape: tuple[int, ...]) -> np.ndarray:

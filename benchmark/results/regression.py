@@ -76,8 +76,8 @@ def check(new: str | Path, reference: str | Path = Path("reports") / "results") 
 
     because a long training makes another draw of every seed on another processor. What that hides shows on average: the
     geometric mean of the RMSEs per model and data set, and over all data sets, is worse by more than 5 % and more than
-    the changes of the same seeds scatter (Student's paired t); of a single one, more than two draws may. A row of the reference is missing when the new results
-    lack it although they have its seed. Raises UnusableInput.
+    the changes of the same seeds scatter (Student's paired t); of a single one, more than two draws may differ. A row
+    of the reference is missing when the new results lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
     for folder in (new, reference):

@@ -56,7 +56,9 @@ class Source:
         except UnusableInput:
             raise
         except ImportError as error:
-            raise UnusableInput(f"{self.name} cannot be read: a package is missing ({one_line(error)})") from error
+            raise UnusableInput(
+                f"{self.name} cannot be read: a package is missing ({one_line(error)}); install it with pip"
+            ) from error
         except Exception as error:  # scipy's reader fails in any way on a broken .mat file
             raise UnusableInput(
                 f"{self.name}: the files in {folder} cannot be read ({one_line(error)}); "

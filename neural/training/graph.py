@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -80,18 +81,19 @@ class _Graph:
         return self.part(block, x)
 
     def part(self, block: Any, x: str) -> str:
-        """Add a block of a network that is no network of the paper."""
+        """Add a block that the networks of the paper do not have."""
         if isinstance(block, Stacked):
             for part in block.blocks:
                 x = self.block(part, x)
             return x
         adders: dict[type, Callable[[Any, str], str]] = {
             Entry: self.entry, Static: self.static, Lru: self.lru, Filtered: self.filtered,
-            StateSpace: self.state_space, Attending: self.attending,
+            StateSpace: self.state_space, Attending: partial(attention_exports.add, self),
         }  # fmt: skip
-        if type(block) not in adders:
-            raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
-        return adders[type(block)](block, x)
+        for kind, add in adders.items():
+            if isinstance(block, kind):
+                return add(block, x)
+        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no graph")
 
     def static(self, block: Static, x: str) -> str:
         inner = self.add("Tanh", self.dense(block.inner, x))
@@ -99,9 +101,6 @@ class _Graph:
 
     def dense(self, layer: Any, x: str) -> str:
         return self.add("Add", self.add("MatMul", x, self.weight(layer.weight.t())), self.weight(layer.bias))
-
-    def attending(self, block: Attending, x: str) -> str:
-        return attention_exports.add(self, block, x)
 
     def normed(self, layer: Any, x: str) -> str:
         return self.add("LayerNormalization", x, self.weight(layer.weight), self.weight(layer.bias), epsilon=layer.eps)

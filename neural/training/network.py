@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import math
 import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
@@ -192,15 +193,15 @@ class Network(ABC):
             raise UnusableInput(f"the mode {self.mode!r} is not known; it is windowed or stateful")
         if self.window < 8:
             raise UnusableInput("a network needs a window of at least 8 samples")
-        chosen = self.hyper_parameters()
-        for name in ("epochs", "batches", "learning_rate", "l2"):
-            if not chosen[name] >= 0:
-                raise UnusableInput(f"{name} is {chosen[name]}; it cannot be below zero")
-        for name, value in chosen.items():
-            if "dropout" in name and not 0 <= value < 1:
-                raise UnusableInput(f"{name} is {value}; give a share from 0 to below 1")
-            if name not in Network.__dataclass_fields__ and isinstance(value, int) and value < 1:
-                raise UnusableInput(f"{name} is {value}; a network needs at least 1")
+        for f in (f for f in fields(self) if f.init):
+            value = getattr(self, f.name)
+            if f.name in ("epochs", "batches", "learning_rate", "l2") and not 0 <= value < math.inf:
+                raise UnusableInput(f"{f.name} is {value}; give a number from 0")
+            if "dropout" in f.name and not 0 <= value < 1:
+                raise UnusableInput(f"{f.name} is {value}; give a share from 0 to below 1")
+            size = isinstance(f.default, int) and not isinstance(f.default, bool) and f.default >= 1
+            if size and f.name not in Network.__dataclass_fields__ and value < 1:
+                raise UnusableInput(f"{f.name} is {value}; a network needs at least 1")
         if self.device != "cpu":
             try:
                 torch.zeros(1, device=self.device)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,32 +111,28 @@ class _Writer:
         return self.part(block, x, nx)
 
     def part(self, block: Any, x: str, nx: int) -> tuple[str, int]:
-        """Write a block of a network that is no network of the paper."""
+        """Write a block that the networks of the paper do not have."""
         if isinstance(block, Stacked):
             for part in block.blocks:
                 x, nx = self.block(part, x, nx)
             return x, nx
         writers: dict[type, Callable[[Any, str, int], tuple[str, int]]] = {
             Entry: self.entry, Static: self.static, Lru: self.lru, Filtered: self.filtered,
-            StateSpace: self.state_space, Attending: self.attending,
+            StateSpace: self.state_space, Attending: partial(attention_exports.write, self),
         }  # fmt: skip
-        if type(block) not in writers:
-            raise UnusableInput(
-                f"the network has a part, {type(block).__name__}, that has no step from sample to sample"
-            )
-        return writers[type(block)](block, x, nx)
+        for kind, write in writers.items():
+            if isinstance(block, kind):
+                return write(block, x, nx)
+        raise UnusableInput(f"the network has a part, {type(block).__name__}, that has no step from sample to sample")
 
     def entry(self, block: Entry, x: str, nx: int) -> tuple[str, int]:
         y = self.array(nx + block.gated)
         self.lines.append(f"gated({x}, {nx}, {block.gated}, {y})")
         return self.dense(block.full, y, nx + block.gated)
 
-    def attending(self, block: Attending, x: str, nx: int) -> tuple[str, int]:
-        return attention_exports.write(self, block, x, nx)
-
     def normed(self, layer: Any, x: str, nx: int) -> str:
         y = self.array(nx)
-        self.lines.append(f"normed({x}, {nx}, {y}, {self.weights(layer.weight, layer.bias)})")
+        self.lines.append(f"normed({x}, {nx}, {y}, {self.weights(layer.weight, layer.bias)}, {layer.eps!r})")
         return y
 
     def dense(self, layer: Any, x: str, nx: int, positive: int = 0) -> tuple[str, int]:

@@ -159,12 +159,12 @@ def section(x: list, n: int, s: list, at: int, y: list, num: list, den: list):
         s[at + n + i] = num[2 * n + i] * x[i] - den[n + i] * y[i]
 
 
-def normed(x: list, n: int, y: list, gain: list, offset: list):
-    """y = gain (x - mean of x) / its standard deviation + offset."""
+def normed(x: list, n: int, y: list, gain: list, offset: list, least: float):
+    """y = gain (x - mean) / sqrt(variance + least) + offset."""
     mean = 0.0
     for i in range(n):
         mean += x[i] / n
-    square = 1e-5
+    square = least
     for i in range(n):
         square += (x[i] - mean) * (x[i] - mean) / n
     for i in range(n):

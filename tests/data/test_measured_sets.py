@@ -224,7 +224,7 @@ def test_a_broken_file_of_a_measured_set_is_refused_in_one_line(made):
 def test_a_package_that_is_missing_is_no_broken_file(monkeypatch):
     monkeypatch.setitem(sys.modules, "nonlinear_benchmarks", None)
     with pytest.raises(
-        UnusableInput, match=r"^emps cannot be read: a package is missing \(.*nonlinear_benchmarks.*\)$"
+        UnusableInput, match=r"^emps cannot be read: a package is missing \(.*nonlinear_benchmarks.*\); install"
     ):
         load("emps")
 
