@@ -162,6 +162,6 @@ def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones():
-    known = "benchmark, crossover, full, paper, records, smoke"
+    known = "benchmark, crossover, full, paper, records, smoke, tuned"
     with pytest.raises(UnusableInput, match=f"no suite 'nosuch'; known are {known}"):
         load_suite("nosuch")
