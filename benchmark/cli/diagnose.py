@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from simgap.cli.options import (
-    Data,
+    DataOrLogs,
     Inputs,
     Json,
     KindOf,
@@ -24,7 +24,7 @@ from simgap.cli.options import (
 
 
 def diagnose(
-    data: Data,
+    data: DataOrLogs,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,

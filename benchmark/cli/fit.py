@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from simgap.cli.options import (
-    Data,
+    DataOrLogs,
     Inputs,
     Json,
     KindOf,
@@ -37,7 +37,7 @@ MANY = 8
 
 def fit(
     model: Annotated[str, typer.Argument(help="Name of a model, or path/to/file.py:Class.")],
-    data: Data,
+    data: DataOrLogs,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,

@@ -15,7 +15,8 @@ from simgap.records import UnusableInput
 if TYPE_CHECKING:
     from simgap.data import Reading
 
-Data = Annotated[
+Data = Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")]
+DataOrLogs = Annotated[
     list[str], typer.Argument(help="Name of a data set, a folder, a CSV file, or several logs of one machine.")
 ]
 Inputs = Annotated[list[str] | None, typer.Option("--input", help="Input column of a CSV file; repeatable.")]

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from simgap.cli.options import (
+    Data,
     Inputs,
     Json,
     Outputs,
@@ -23,7 +24,7 @@ from simgap.cli.options import (
 
 def range_test(
     model: Annotated[str, typer.Argument(help="Name of a network.")],
-    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    data: Data,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,

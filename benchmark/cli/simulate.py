@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from simgap.cli.options import Json, Resample, SamplingTime, SplitGaps, check_writable, write_json
+from simgap.cli.options import Data, Json, Resample, SamplingTime, SplitGaps, check_writable, write_json
 
 
 def simulate(
     saved: Annotated[Path, typer.Argument(help="File that `simgap fit --save` or `simgap diagnose --save` wrote.")],
-    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    data: Data,
     experiment: Annotated[str | None, typer.Option(help="Only this experiment; else all to test on.")] = None,
     dt: SamplingTime = None,
     resample: Resample = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from simgap.cli.options import (
+    Data,
     Inputs,
     Json,
     KindOf,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 def tune(
     model: Annotated[str, typer.Argument(help="Name of a model, or path/to/file.py:Class.")],
-    data: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    data: Data,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,
