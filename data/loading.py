@@ -172,6 +172,8 @@ def read_tables(source: Any, choices: Choices) -> list[Table]:
 
 def _each_once(logs: Sequence[Any]) -> list[Path]:
     """Check that logs are files, none of them twice. Raises UnusableInput."""
+    if not logs or not all(isinstance(log, str | os.PathLike) for log in logs):
+        raise UnusableInput("a data set cannot be made from this list; give the paths of log files")
     files: list[Path] = []
     for log in map(Path, logs):
         if log.is_dir() or (not log.exists() and is_registered(str(log))):
@@ -181,8 +183,6 @@ def _each_once(logs: Sequence[Any]) -> list[Path]:
         if log.exists() and any(log.samefile(file) for file in files):
             raise UnusableInput(f"{log} is named twice, and would be in training and test; name each log once")
         files.append(log)
-    if not files:
-        raise UnusableInput("there is no log in the list")
     return files
 
 
@@ -193,7 +193,7 @@ def read_table(source: Any, choices: Choices) -> Table:
 
         return table_of(source)
     path = Path(source)
-    if not os.path.exists(path):  # noqa: PTH110
+    if not os.path.exists(source):  # noqa: PTH110
         raise UnusableInput(_nowhere(os.fspath(source)))
     if not path.is_file():  # a pipe would never end
         raise UnusableInput(f"{path} is no ordinary file; give a CSV file")

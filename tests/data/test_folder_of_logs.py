@@ -65,7 +65,7 @@ def test_what_is_no_list_of_different_files_is_refused(logs, refused, others, sa
 
 def test_data_sets_and_nothing_at_all_are_no_list_of_logs(refused):
     assert "gimbal_short is a folder or a data set, so name it alone" in refused(["gimbal_short"])
-    assert refused([]) == "there is no log in the list"
+    assert refused([]) == "a data set cannot be made from this list; give the paths of log files"
 
 
 def test_a_named_log_that_is_not_there_is_said_to_be_missing(logs, refused):
