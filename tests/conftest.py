@@ -1,12 +1,14 @@
 """Shapes and types of every public function are checked while the tests run, and only then."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 from floor_plan import ROOT, modules
 from jaxtyping import install_import_hook
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # Called a hundred thousand times by one search; checks would make them five times as slow.
 INSIDE_A_FIT = (
     "greybox.fitting", "greybox.levenberg", "greybox.machine", "greybox.noise", "greybox.normal_equations",
@@ -40,3 +42,17 @@ def measured() -> Path:
     if not folder.is_dir():
         pytest.skip("no measured data here: set SIMGAP_DATA to the folder that holds them")
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One Chromium for all pages: playwright runs once in a process."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed; make dev installs it")
+    chromium = os.environ.get("SIMGAP_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), "")
+    if not chromium:
+        pytest.skip("no Chromium here; on Debian: apt-get install chromium")
+    with sync_api.sync_playwright() as playwright:
+        # A root user, as in a container, cannot have Chromium's sandbox; the pages are our own.
+        running = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield running
+        running.close()

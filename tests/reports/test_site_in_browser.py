@@ -1,26 +1,8 @@
 """The site in a real browser, from disk: it sorts, filters, overlays, opens a diagnosis, and asks nobody."""
 
-import os
-import shutil
-
 import pytest
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed; make dev installs it")
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-CHROMIUM = os.environ.get("SIMGAP_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), "")
-pytestmark = [
-    pytest.mark.skipif(not CHROMIUM, reason="no Chromium here; on Debian: apt-get install chromium"),
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # of playwright's own pipes
-]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        # A root user, as in a container, cannot have Chromium's sandbox; the pages are our own.
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")  # of playwright's own pipes
 
 
 @pytest.fixture
