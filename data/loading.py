@@ -170,20 +170,20 @@ def read_tables(source: Any, choices: Choices) -> list[Table]:
     return [read_table(source, choices)]
 
 
-def _each_once(logs: Sequence[Any]) -> list[Path]:
-    """Check that logs are files, none of them twice. Raises UnusableInput."""
+def _each_once(logs: Sequence[Any]) -> Sequence[Any]:
+    """Check that logs are paths of files, none of them twice. Raises UnusableInput."""
     if not logs or not all(isinstance(log, str | os.PathLike) for log in logs):
         raise UnusableInput("a data set cannot be made from this list; give the paths of log files")
-    files: list[Path] = []
-    for log in map(Path, logs):
-        if log.is_dir() or (not log.exists() and is_registered(str(log))):
+    for log in logs:
+        if not os.path.exists(log) and not is_registered(os.fspath(log)):  # noqa: PTH110  # it never raises
+            raise UnusableInput(_nowhere(os.fspath(log)))
+        if not os.path.isfile(log):  # noqa: PTH113
             raise UnusableInput(
                 f"of several logs each must be a file; {log} is a folder or a data set, so name it alone"
             )
-        if log.exists() and any(log.samefile(file) for file in files):
+        if sum(os.path.samefile(log, other) for other in logs if os.path.exists(other)) > 1:  # noqa: PTH110, PTH121
             raise UnusableInput(f"{log} is named twice, and would be in training and test; name each log once")
-        files.append(log)
-    return files
+    return logs
 
 
 def read_table(source: Any, choices: Choices) -> Table:

@@ -7,7 +7,6 @@ import sys
 import pytest
 
 HEAVY = {"control", "jaxtyping", "numba", "numpy", "pandas", "rich", "scipy", "torch", "typer"}
-COMMAND = "import sys; from simgap.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
 def test_import_simgap_loads_nothing_heavy():
@@ -31,7 +30,7 @@ def test_python_runs_the_command_line_as_a_module():
 def test_a_command_that_fits_nothing_does_not_import_torch(arguments, tmp_path):
     # Nothing catches this, whereas an ImportError could be taken for a missing dependency.
     (tmp_path / "torch.py").write_text("import os\nos._exit(77)\n")
-    command = [sys.executable, "-W", "error", "-c", COMMAND, *arguments.split()]
+    command = [sys.executable, "-W", "error", "-m", "simgap", *arguments.split()]
     done = subprocess.run(
         command, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
     )

@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, KindOf, Outputs, Resample, SamplingTime, SplitGaps, read_data, write_json
+from simgap.cli.options import (
+    Data,
+    Inputs,
+    Json,
+    KindOf,
+    Outputs,
+    Resample,
+    SamplingTime,
+    SplitGaps,
+    read_data,
+    write_json,
+)
 
 app = typer.Typer(help="Make, fetch and check data sets.", rich_markup_mode=None)
 
@@ -37,7 +48,7 @@ def fetch(name: Name) -> None:
 
 @app.command()
 def check(
-    name: Annotated[str, typer.Argument(help="Name of a data set, a folder or a CSV file.")],
+    name: Data,
     inputs: Inputs = None,
     outputs: Outputs = None,
     dt: SamplingTime = None,

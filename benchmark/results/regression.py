@@ -163,12 +163,11 @@ class _Group:
         """
         was, is_now = (math.exp(statistics.fmean(of)) for of in zip(*pairs, strict=True))
         changes = [after - before for before, after in pairs]
-        draws = list(_means(self.before).values())
-        reach = 0.0
         if len(changes) > 1:
-            reach = _once_in_a_thousand(len(changes)) * statistics.stdev(changes) / math.sqrt(len(changes))
-        elif len(draws) > 1:
-            reach = _once_in_a_thousand(len(draws)) * statistics.stdev(draws) * math.sqrt(2)
+            known, of_the_mean = changes, 1 / math.sqrt(len(changes))
+        else:
+            known, of_the_mean = list(_means(self.before).values()), math.sqrt(2)
+        reach = _once_in_a_thousand(len(known)) * statistics.stdev(known) * of_the_mean if len(known) > 1 else 0.0
         limit = was * math.exp(min(max(reach, math.log1p(STOCHASTIC)), ENDLESS))
         return self._judged(ON_AVERAGE, None, was, is_now, limit, None)
 

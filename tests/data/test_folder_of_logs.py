@@ -68,8 +68,11 @@ def test_data_sets_and_nothing_at_all_are_no_list_of_logs(refused):
     assert refused([]) == "a data set cannot be made from this list; give the paths of log files"
 
 
-def test_a_named_log_that_is_not_there_is_said_to_be_missing(logs, refused):
-    assert f"there is no file {logs / 'log99.csv'}" in refused([logs / "log1.csv", logs / "log99.csv"], **COLUMNS)
+@pytest.mark.parametrize("name", ["log99.csv", 300 * "x" + ".csv", "a\0b.csv"])
+def test_a_named_log_that_is_not_there_is_said_to_be_missing(logs, refused, name):
+    there, missing = str(logs / "log1.csv"), f"{logs}/{name}"
+    for files in ([there, missing], [missing, there]):
+        assert f"there is no file {missing}" in refused(files, **COLUMNS)
 
 
 def test_files_of_other_endings_beside_the_csv_files_and_hidden_ones_are_no_logs(logs):
