@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from simgap.baselines.estimation.armax_search import estimate_armax
 from simgap.baselines.estimation.gram import rough_means
@@ -20,6 +21,8 @@ class Armax(LinearModel):
 
     na, nb, nc, nk in the toolbox convention; without them na = nb = nc is selected up to max_order, nk from 0 and 1.
     """
+
+    by_prediction: ClassVar[bool] = True
 
     na: Order | None = None
     nb: Order | None = None

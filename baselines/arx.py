@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from simgap.baselines.estimation.equation_error import estimate_arx
 from simgap.baselines.estimation.gram import lagged_gram, rough_means
@@ -18,10 +19,12 @@ from simgap.registry import MODELS
 class Arx(LinearModel):
     """A(q) y(t) = B(q) u(t) + e(t), by least squares over all experiments (Ljung 1999, section 4.2).
 
-    na, nb, nk in the toolbox convention, a number or a matrix per pair of channels; without them the order with the
-    best free run on the validation split (or the least AIC or BIC) is taken, up to max_order. offset estimates a
-    constant along, for data that do not have mean zero.
+    na, nb, nk in the toolbox convention, a number or a matrix per pair of channels; without them the order is taken
+    that, estimated on train, runs best on train and valid (or that of the least AIC or BIC), up to max_order. offset
+    estimates a constant along, for data that do not have mean zero.
     """
+
+    by_prediction: ClassVar[bool] = True
 
     na: Order | None = None
     nb: Order | None = None

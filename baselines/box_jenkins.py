@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from simgap.baselines.estimation.box_jenkins_search import estimate_box_jenkins
 from simgap.baselines.estimation.gram import rough_means
@@ -21,6 +22,8 @@ class BoxJenkins(LinearModel):
     nb, nc, nd, nf, nk in the toolbox convention; without them nf = nb is selected up to max_order, nc = nd from 1 and
     2, nk from 0 and 1. A free run is that of B/F; what the start shows of the disturbance dies away as C/D says.
     """
+
+    by_prediction: ClassVar[bool] = True
 
     nb: Order | None = None
     nc: Order | None = None

@@ -41,6 +41,8 @@ class LinearModel(ABC):
     """
 
     parts: ClassVar = (LinearFit, Orders, Polynomial, Row)  # records in a saved model
+    # Whether the estimate makes one-step errors small, so that a free run of training data is as fair as any other.
+    by_prediction: ClassVar[bool] = False
 
     result: LinearFit
     select: Criterion
@@ -137,12 +139,12 @@ class LinearModel(ABC):
 
         So the model that is refined is the one that was chosen, and no other minimum of the same order.
         """
-        valid = [e for e in data.valid if len(e) > data.n_init]
+        train, valid = ([e for e in split if len(e) > data.n_init] for split in (data.train, data.valid))
         by_simulation = self.select == "valid" and bool(valid)
         experiments = data.train if by_simulation else data.train + data.valid
         fits = self._fits(experiments, data.n_init, candidates)
         if by_simulation:
-            chosen = simplest_of_the_best(fits, valid, data.n_init)
+            chosen = simplest_of_the_best(fits, train + valid if self.by_prediction else valid, data.n_init)
         else:
             penalty = 2.0 if self.select == "aic" else float(np.log(fits[0].samples))
             chosen = min(fits, key=lambda fit: fit.criterion(penalty))
@@ -166,20 +168,21 @@ class LinearModel(ABC):
         return fits
 
 
-def simplest_of_the_best(fits: list[LinearFit], valid: Sequence[Experiment], n_init: int) -> LinearFit:
+def simplest_of_the_best(fits: list[LinearFit], judged: Sequence[Experiment], n_init: int) -> LinearFit:
     """Choose the fit with the fewest coefficients whose free run is no worse than the best by more than chance."""
-    return fits[simplest([fit.polynomial for fit in fits], [fit.n_params for fit in fits], valid, n_init)]
+    return fits[simplest([fit.polynomial for fit in fits], [fit.n_params for fit in fits], judged, n_init)]
 
 
 def simplest(
-    models: Sequence[Polynomial | StateSpace], sizes: Sequence[int], valid: Sequence[Experiment], n_init: int
+    models: Sequence[Polynomial | StateSpace], sizes: Sequence[int], judged: Sequence[Experiment], n_init: int
 ) -> int:
     """Choose the smallest model whose free run is no worse than the best by more than chance, and give its place.
 
-    Chance is one standard error of the difference over pieces of the validation data (Breiman, Friedman, Olshen and
-    Stone 1984, section 3.4.3, on paired differences).
+    Chance is one standard error over pieces of the data, of the difference or of the best one's error, whichever is
+    less (Breiman, Friedman, Olshen and Stone 1984, section 3.4.3). A model that fails in a single piece has a standard
+    error as large as its mean difference, whatever that is, and would pass by the first alone.
     """
-    errors = np.array([free_run_errors(model, valid, n_init) for model in models])  # [F, K]
+    errors = np.array([free_run_errors(model, judged, n_init) for model in models])  # [F, K]
     best = int(np.argmin(errors.mean(axis=1)))
     if not np.isfinite(errors[best]).all():
         return int(np.argmin(sizes))
@@ -187,7 +190,7 @@ def simplest(
         return best
     with np.errstate(over="ignore", invalid="ignore"):  # a fit that diverged has huge or infinite errors
         worse = errors - errors[best]
-        chance = worse.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])
+        chance = np.minimum(worse.std(axis=1, ddof=1), errors[best].std(ddof=1)) / np.sqrt(errors.shape[1])
         as_good = worse.mean(axis=1) <= np.nan_to_num(chance)
     return int(np.argmin(np.where(as_good, sizes, np.inf)))
 

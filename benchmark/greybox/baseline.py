@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.held_out import block_errors
 from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Plant
@@ -75,6 +76,10 @@ class Baseline:
     def n_errors(self) -> int:
         """Number of errors in training: measured samples times outputs."""
         return self.train.samples * self.plant.ny
+
+    def held_out_errors(self, fit: Estimate) -> Float[np.ndarray, " K"]:
+        """Average the squared errors of held-out free runs of a model, block by block; see `block_errors`."""
+        return block_errors(fit, self.valid, self.n_init, self.train)
 
     def problem(self, plant: Plant) -> Problem:
         """Set up the fit of a plant to the training records."""

@@ -35,7 +35,7 @@ def errors_on(fit: Estimate, records: Records, n_init: int, train: Records | Non
     return Problem(fit.plant, records, noise).errors(fit.theta, start)
 
 
-def block_errors(fit: Estimate, valid: Records, n_init: int, train: Records | None = None) -> np.ndarray:
+def block_errors(fit: Estimate, valid: Records, n_init: int, train: Records | None) -> np.ndarray:
     """Average the squared errors of held-out free runs, in units of the outputs' sizes, over about twenty blocks.
 
     They begin as `errors_on` does.

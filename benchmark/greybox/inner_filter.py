@@ -13,7 +13,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.filtered_saturation import FilteredSaturation
 from simgap.greybox.effects.inner_saturation import InnerSaturation
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.held_out import as_good_as_best, block_errors
+from simgap.greybox.held_out import as_good_as_best
 from simgap.greybox.linear import scaled
 from simgap.greybox.rivals import is_better_order
 from simgap.greybox.selection import Selection, select_around
@@ -45,7 +45,7 @@ def with_inner_filter(selection: Selection, channels: Channels) -> Selection:
     numbers = chosen.theta[chosen.plant.part_of(limit)]
     filtered = Term(FilteredSaturation(), limit.channel)
     fits = on_cores(partial(_fit, before, channels, filtered, numbers, sections), plants)
-    errors = [block_errors(fit, before.valid, before.n_init, before.train) for _, fit in fits]
+    errors = [before.held_out_errors(fit) for _, fit in fits]
     other = select_around(*fits[as_good_as_best(errors)])
     return other if is_better_order(other, selection) else selection
 

@@ -39,7 +39,7 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
     best, least = None, math.inf
     beside = ((chosen, terms, values) for terms, values in _beside(chosen))
     for before, terms, values in ((baseline.estimate, (), ()), *beside):
-        to_beat = block_errors(before, baseline.valid, baseline.n_init)
+        to_beat = block_errors(before, baseline.valid, baseline.n_init, None)
         shapes = list(two_masses.shapes(before.theta[plant.layout.poles], records.duration, dt))
         for side in SIDES:
             joint = Plant(
@@ -48,7 +48,7 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
             ).having(terms)  # fmt: skip
             fit = fit_plain(joint, records, shapes=shapes, of_terms=values)
             shapes = [*shapes[::4], list(fit.theta[joint.layout.poles])]  # both sides have the same poles
-            left = block_errors(fit, baseline.valid, baseline.n_init)
+            left = block_errors(fit, baseline.valid, baseline.n_init, None)
             gain = to_beat - left
             seen = two_masses.swings(fit.theta[joint.layout.poles], records.duration, dt)
             enough = gain.mean() > max(WORTH_AN_ORDER * to_beat.mean(), gain.std() / math.sqrt(len(gain)))

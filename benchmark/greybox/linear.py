@@ -70,7 +70,7 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
     baseline = baseline_of(models[-1])
-    to_beat = block_errors(baseline.estimate, held_out, n_init, records)
+    to_beat = baseline.held_out_errors(baseline.estimate)
     for simpler in (fit for fit in models[:-1] if fit.plant.by_rate or not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
@@ -84,7 +84,7 @@ def find_baseline(
 
 def _does_as_well(other: Estimate, baseline: Baseline, to_beat: np.ndarray) -> bool:
     """Tell whether a model does not err more than the plain one in most held-out blocks, and scores higher."""
-    held_out = block_errors(other, baseline.valid, baseline.n_init, baseline.train)
+    held_out = baseline.held_out_errors(other)
     if in_most(held_out - to_beat):  # as nearly all do, at less cost
         return False
     return score_gain(baseline, other, baseline, baseline.estimate) > 0
@@ -134,7 +134,7 @@ def plain_models(
         plant = Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2)
         return [fit_plain(plant, train)], ()
     single = kind != "level" and nu == 1
-    models = linear_models(train, range(3, MAX_ORDER + 1)) if single else []
+    models = linear_models(train, range(2, MAX_ORDER + 1)) if single else []
     tried: list[tuple[Estimate, np.ndarray]] = []
     smaller: dict[bool, Estimate] = {}  # of one order less, without and with zeros
     rounds_in_vain = 0

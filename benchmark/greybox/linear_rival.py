@@ -11,7 +11,7 @@ import numpy as np
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.periodic_disturbance import PeriodicDisturbance
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.held_out import block_errors, in_most
+from simgap.greybox.held_out import in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
@@ -58,9 +58,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     if _swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
         return None
-    with_effects, without, of_linear = (
-        block_errors(fit, plain.valid, data.n_init, plain.train) for fit in (chosen, plain.estimate, linear.estimate)
-    )
+    with_effects, without, of_linear = map(plain.held_out_errors, (chosen, plain.estimate, linear.estimate))
     gain = with_effects - of_linear
     # What the readings show needs no better simulation.
     if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
@@ -93,11 +91,11 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     that is too simple a one, and effects would stand in for the order that it lacks. A rival scores as high as they and
     errs more in no more held-out blocks than by chance; or it is the best on held-out data, and errs less in most.
     """
-    plain, chosen, n_init = selection.baseline, selection.trial.estimate, selection.baseline.n_init
+    plain, chosen = selection.baseline, selection.trial.estimate
     if not plain.orders or all(term.effect.visible_in_readings for term in chosen.plant.terms):
         return None
-    with_effects = block_errors(chosen, plain.valid, n_init)
-    rivals = [(with_effects - block_errors(fit, plain.valid, n_init), fit) for fit in plain.orders]
+    with_effects = plain.held_out_errors(chosen)
+    rivals = [(with_effects - plain.held_out_errors(fit), fit) for fit in plain.orders]
     gain, best = max(rivals, key=_mean_gain)
     if not in_most(gain):
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]

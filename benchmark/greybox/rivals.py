@@ -8,7 +8,7 @@ import numpy as np
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.held_out import block_errors, in_most
+from simgap.greybox.held_out import in_most
 from simgap.greybox.joint import on_joint, with_joint
 from simgap.greybox.leftover import look_for_more
 from simgap.greybox.linear import first_order_hold, scaled
@@ -100,7 +100,7 @@ def of_higher_order(selection: Selection, more: int, channels: Channels) -> Base
 
 def is_better_order(other: Selection, before: Selection) -> bool:
     """Tell whether effects on a plant of higher order err less on most held-out blocks, or in the mean at no cost."""
-    was, now = (block_errors(of.trial.estimate, of.baseline.valid, of.baseline.n_init) for of in (before, other))
+    was, now = (of.baseline.held_out_errors(of.trial.estimate) for of in (before, other))
     as_few = other.trial.cost <= before.trial.cost and now.mean() < was.mean()
     return (as_few or in_most(was - now)) and is_better(other.trial.estimate, other.baseline, before)
 
@@ -112,12 +112,10 @@ def of_several_masses(linear: Baseline, before: Selection, channels: Channels) -
     its order is too high for them, they are selected on the best one below, and must then do better than it does.
     """
 
-    def left(fit: Estimate) -> np.ndarray:
-        return block_errors(fit, linear.valid, linear.n_init, linear.train)
-
     plants = [fit for fit in (linear.estimate, *linear.orders) if 1 < fit.plant.order <= MAX_ORDER]
     if before.baseline.plant.kind != "velocity" or not plants:
         return None
+    left = linear.held_out_errors
     fit = linear.estimate if linear.estimate in plants else min(plants, key=lambda fit: left(fit).mean())
     plain = replace(fit, plant=replace(fit.plant, kind="velocity"))
     found = select(replace(linear, estimate=scaled(plain, linear.train, channels, linear.outputs)))

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from simgap.baselines.arx import Arx
-from simgap.baselines.estimation.linear import IdentificationWarning
+from simgap.baselines.estimation.linear import IdentificationWarning, simplest
+from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.fir import Fir
 from simgap.records import Experiment, TrainingSet, UnusableInput
 
@@ -113,6 +114,30 @@ def test_the_order_of_a_simulated_system_is_found(select):
     model.fit(TrainingSet((train,), (valid,), 20), 0)
     assert model.fitted["na"] in (3, 4)
     assert model.fitted["nk"] in (1, 2)
+
+
+def test_training_data_have_a_say_in_an_order_where_validation_data_tell_little():
+    rng = np.random.default_rng(9)
+    a = np.poly([0.9, 0.6 + 0.3j, 0.6 - 0.3j]).real
+    train = simulated(rng, a, [1.0, 0.5, 0.2], 2, 3000, noise=0.02)
+    valid = simulated(rng, a, [1.0, 0.5, 0.2], 2, 60, noise=2.0)
+    model = Arx()
+    model.fit(TrainingSet((train,), (valid,), 20), 0)
+    assert model.fitted["na"] in (3, 4)
+
+
+def test_a_smaller_model_that_fails_in_one_piece_of_the_data_is_not_as_good_by_chance():
+    rng = np.random.default_rng(12)
+    record = simulated(rng, [1, -0.9], [0.5], 1, 1000, noise=0.1)
+    ones, none = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
+    good, growing = (
+        Polynomial(
+            a=np.concatenate((ones, pole * ones)), b=np.concatenate((none, 0.5 * ones)),
+            c=np.concatenate((ones, none)), u_mean=np.zeros(1), y_mean=np.zeros(1), dt=0.1,
+        )
+        for pole in (-0.9, -1.3)
+    )  # fmt: skip
+    assert simplest([good, growing], [2, 1], [record], 5) == 0
 
 
 def test_an_unstable_model_is_announced_with_its_growth():
