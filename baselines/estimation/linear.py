@@ -62,7 +62,8 @@ class LinearModel(ABC):
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Estimate on train and valid together; a selection by validation compares fits on train alone.
 
-        The estimate has no randomness, so the seed changes nothing.
+        A model of one-step errors stays as it was chosen where that simulates all data better. The estimate has no
+        randomness, so the seed changes nothing.
         """
         check_limits(self)
         ny, nu = len(data.channels.outputs), len(data.channels.inputs)
@@ -71,6 +72,10 @@ class LinearModel(ABC):
             orders, start = self._selected(data, self.candidates(ny, nu))
         everything = data.train + data.valid
         self.result = self.estimator(everything, data.n_init, orders.max_lag)(orders, start)
+        judged = [e for e in everything if len(e) > data.n_init]
+        if self.by_prediction and start is not None and judged:
+            # More data make one-step errors smaller, and may make a pole unstable that was not.
+            self.result = simplest_of_the_best([self.result, start], judged, data.n_init)
         self._data = data
         for complaint in self.result.complaints():
             warnings.warn(complaint, IdentificationWarning, stacklevel=2)

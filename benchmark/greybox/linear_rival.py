@@ -67,10 +67,30 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         beside_taken = gain.mean() > BEYOND * (without.mean() - with_effects.mean())
         beside_left = of_linear.mean() < HALVES_LEAVE * with_effects.mean()
         return LinearRival.of(linear, gain) if better and (beside_taken or beside_left) else None
-    beaten = not in_most(gain) and score_gain(plain, chosen, linear, linear.estimate) > BETTER
-    if beaten or halves_speak_for(plain, chosen, linear.estimate):
+    return _unbeaten(plain, chosen, linear, channels)
+
+
+def _unbeaten(plain: Baseline, chosen: Estimate, linear: Baseline, channels: Channels) -> LinearRival | None:
+    """Find a linear model that nonlinear effects do not beat: the one that held-out data ask for, or another order.
+
+    The simplest that is as good as the best but for chance may lack a pole which effects stand in for.
+    """
+    with_effects = plain.held_out_errors(chosen)
+    gain = with_effects - plain.held_out_errors(linear.estimate)
+    if not _beaten(plain, chosen, gain, linear, linear.estimate):
+        return LinearRival.of(linear, gain)
+    others = [(with_effects - plain.held_out_errors(fit), fit) for fit in linear.orders]
+    unbeaten = [(gain, fit) for gain, fit in others if not _beaten(plain, chosen, gain, linear, fit)]
+    if not unbeaten:
         return None
-    return LinearRival.of(linear, gain)
+    gain, best = max(unbeaten, key=_mean_gain)
+    return LinearRival.of(replace(linear, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
+
+
+def _beaten(plain: Baseline, chosen: Estimate, gain: np.ndarray, linear: Baseline, fit: Estimate) -> bool:
+    """Tell whether effects score higher than a linear model and err no more, or leave far less of other records."""
+    better = not in_most(gain) and score_gain(plain, chosen, linear, fit) > BETTER
+    return better or halves_speak_for(plain, chosen, fit)
 
 
 def _swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: float) -> bool:

@@ -126,6 +126,20 @@ def test_training_data_have_a_say_in_an_order_where_validation_data_tell_little(
     assert model.fitted["na"] in (3, 4)
 
 
+def test_a_last_estimate_that_simulates_worse_than_the_chosen_one_is_not_kept():
+    rng = np.random.default_rng(13)
+    train, valid = (simulated(rng, [1, -0.9], [1.0], 1, 300, noise=0.05) for _ in range(2))
+    growing = simulated(rng, [1, -1.02], [1.0], 1, 300)
+
+    class Spoilt(Arx):
+        def estimator(self, experiments, n_init, max_lag):
+            return super().estimator(experiments if len(experiments) == 1 else [growing], n_init, max_lag)
+
+    model = Spoilt(max_order=1)
+    model.fit(TrainingSet((train,), (valid,), 20), 0)
+    np.testing.assert_allclose(model.polynomial.a, model.as_chosen().a, atol=1e-3)
+
+
 def test_a_smaller_model_that_fails_in_one_piece_of_the_data_is_not_as_good_by_chance():
     rng = np.random.default_rng(12)
     record = simulated(rng, [1, -0.9], [0.5], 1, 1000, noise=0.1)

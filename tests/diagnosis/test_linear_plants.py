@@ -12,7 +12,7 @@ STUDY = runpy.run_path(str(Path(__file__).with_name("linear_plants.py")))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["other", "velocity"])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [*range(8), 10, 51])
 def test_of_a_linear_plant_nothing_is_named(seed, kind):
     found = diagnose(STUDY["data_set"](seed, kind)).findings
     assert not found.causes
