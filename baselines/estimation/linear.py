@@ -71,6 +71,11 @@ class LinearModel(ABC):
         if orders is None:
             orders, start = self._selected(data, self.candidates(ny, nu))
         everything = data.train + data.valid
+        if orders.max_lag >= (longest := max(map(len, everything))):
+            raise TooFewSamples(
+                f"the model reaches {orders.max_lag} samples back, and the longest experiment has {longest}; "
+                f"lower the order or record more"
+            )
         self.result = self.estimator(everything, data.n_init, orders.max_lag)(orders, start)
         judged = [e for e in everything if len(e) > data.n_init]
         if self.by_prediction and start is not None and judged:

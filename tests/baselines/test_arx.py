@@ -10,6 +10,7 @@ from simgap.baselines.arx import Arx
 from simgap.baselines.estimation.linear import IdentificationWarning, simplest
 from simgap.baselines.estimation.polynomial import Polynomial
 from simgap.baselines.fir import Fir
+from simgap.baselines.fir_regularised import FirRegularised
 from simgap.records import Experiment, TrainingSet, UnusableInput
 
 
@@ -174,6 +175,12 @@ def test_too_few_samples_are_refused_with_the_numbers():
     short = simulated(rng, [1, -0.5], [1.0], 1, 12)
     with pytest.raises(UnusableInput, match="11 coefficients from 7 equations"):
         Arx(5, 5, 1).fit(TrainingSet((short,), (), 3), 0)
+
+
+def test_an_order_that_reaches_back_beyond_every_experiment_is_refused_before_any_work():
+    short = simulated(np.random.default_rng(8), [1, -0.5], [1.0], 1, 50)
+    with pytest.raises(UnusableInput, match="reaches 99999 samples back, and the longest experiment has 50"):
+        FirRegularised(nb=100_000).fit(TrainingSet((short,), (), 3), 0)
 
 
 @pytest.mark.parametrize(
