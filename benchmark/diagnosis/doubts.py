@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.held_out import in_most
 from simgap.greybox.identification import Identified
 from simgap.greybox.selection import Selection
 from simgap.records import Channels, Experiment
@@ -70,7 +71,7 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     """Tell in a sentence that the mean of a held-out record is a better model of it than the best plant, and why."""
     baseline, trial = selection.baseline, selection.trial
-    if float(trial.blocks.sum()) < baseline.squares_of_mean:
+    if in_most(baseline.blocks_of_mean - trial.blocks):
         return None
     records, plant = baseline.train, trial.estimate.plant
     read = [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]

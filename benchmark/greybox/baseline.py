@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.held_out import block_errors
+from simgap.greybox.held_out import block_errors, squares_of_blocks
 from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.plant import Plant
@@ -64,13 +64,13 @@ class Baseline:
         return white_as_large_as(self.estimate.errors, self.train.mask, self.train.resolution)
 
     @cached_property
-    def squares_of_mean(self) -> float:
-        """Squared errors of a model that knows the mean of each held-out record and no more, weighted as the others."""
+    def blocks_of_mean(self) -> Float[np.ndarray, " K"]:
+        """Squared errors of a model that knows the mean of each held-out record and no more, block by block."""
         valid = self.valid
         known = valid.mask[:, :, None]
         counted = np.maximum(1, known.sum(axis=1, keepdims=True))  # every reading of a record may be left out
         means = np.sum(np.where(known, valid.y, 0.0), axis=1, keepdims=True) / counted
-        return float(np.sum(np.where(known, self.noise.whiten(valid.y - means), 0.0) ** 2))
+        return squares_of_blocks(Problem(self.plant, valid, self.noise), valid.y - means)
 
     @property
     def n_errors(self) -> int:

@@ -58,16 +58,25 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     if _swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
         return None
-    with_effects, without, of_linear = map(plain.held_out_errors, (chosen, plain.estimate, linear.estimate))
-    gain = with_effects - of_linear
-    # What the readings show needs no better simulation.
-    if all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms):
-        error = gain.std() / math.sqrt(len(gain))
-        better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
-        beside_taken = gain.mean() > BEYOND * (without.mean() - with_effects.mean())
-        beside_left = of_linear.mean() < HALVES_LEAVE * with_effects.mean()
-        return LinearRival.of(linear, gain) if better and (beside_taken or beside_left) else None
+    if _needs_no_better(chosen):
+        gain = plain.held_out_errors(chosen) - plain.held_out_errors(linear.estimate)
+        return LinearRival.of(linear, gain) if _far_beyond(plain, chosen, gain) else None
     return _unbeaten(plain, chosen, linear, channels)
+
+
+def _needs_no_better(chosen: Estimate) -> bool:
+    """Tell whether effects are linear themselves, or show in the readings, so that a linear model may do as well."""
+    return all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms)
+
+
+def _far_beyond(plain: Baseline, chosen: Estimate, gain: np.ndarray) -> bool:
+    """Tell whether a linear model gains more on held-out data, beyond linear effects of few numbers, than any would."""
+    left, without = (plain.held_out_errors(fit).mean() for fit in (chosen, plain.estimate))
+    error = gain.std() / math.sqrt(len(gain))
+    better = gain.mean() > max(WORTH_AN_ORDER * left, CONSISTENT * error)
+    beside_taken = gain.mean() > BEYOND * (without - left)
+    beside_left = left - gain.mean() < HALVES_LEAVE * left
+    return bool(better and (beside_taken or beside_left))
 
 
 def _unbeaten(plain: Baseline, chosen: Estimate, linear: Baseline, channels: Channels) -> LinearRival | None:
@@ -117,6 +126,8 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     with_effects = plain.held_out_errors(chosen)
     rivals = [(with_effects - plain.held_out_errors(fit), fit) for fit in plain.orders]
     gain, best = max(rivals, key=_mean_gain)
+    if _needs_no_better(chosen) and not _far_beyond(plain, chosen, gain):
+        return None
     if not in_most(gain):
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
         alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= BETTER]

@@ -170,7 +170,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         straight = free_run_ratio(baseline, smaller, larger) > paid
         return straight and larger.valid - smaller.valid - price > HELD_OUT
     # One simulation that grows without bound must not outweigh all other blocks.
-    most = WORST * baseline.squares_of_mean / len(smaller.blocks)
+    most = WORST * baseline.blocks_of_mean.mean()
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
