@@ -65,12 +65,12 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
 
 
 def _needs_no_better(chosen: Estimate) -> bool:
-    """Tell whether effects are linear themselves, or show in the readings, so that a linear model may do as well."""
+    """Tell whether effects are linear themselves or show in the readings: a linear model that does as well is no doubt."""
     return all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms)
 
 
 def _far_beyond(plain: Baseline, chosen: Estimate, gain: np.ndarray) -> bool:
-    """Tell whether a linear model gains more on held-out data, beyond linear effects of few numbers, than any would."""
+    """Tell whether a linear model errs so much less on held-out data that linear effects of few numbers are no name."""
     left, without = (plain.held_out_errors(fit).mean() for fit in (chosen, plain.estimate))
     error = gain.std() / math.sqrt(len(gain))
     better = gain.mean() > max(WORTH_AN_ORDER * left, CONSISTENT * error)
