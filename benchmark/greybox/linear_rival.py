@@ -65,7 +65,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
 
 
 def _needs_no_better(chosen: Estimate) -> bool:
-    """Tell whether effects are linear themselves or show in the readings: a linear model that does as well is no doubt."""
+    """Tell whether effects are linear or show in the readings: then a linear model that does as well is no doubt."""
     return all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms)
 
 
