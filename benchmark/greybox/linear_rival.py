@@ -126,11 +126,10 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     with_effects = plain.held_out_errors(chosen)
     rivals = [(with_effects - plain.held_out_errors(fit), fit) for fit in plain.orders]
     gain, best = max(rivals, key=_mean_gain)
-    if _needs_no_better(chosen) and not _far_beyond(plain, chosen, gain):
-        return None
     if not in_most(gain):
+        most = 0.0 if _needs_no_better(chosen) else BETTER  # a delay that scores higher is itself the linear model
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
-        alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= BETTER]
+        alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= most]
         if not alike:
             return None
         gain, best = max(alike, key=_mean_gain)
