@@ -151,7 +151,9 @@ def test_every_page_is_linked_from_the_readme():
 
 def test_every_model_stands_in_the_table_that_says_when_to_use_it():
     text = (ROOT / "docs" / "models.md").read_text(encoding="utf-8")
-    assert not [name for name in MODELS if f"`{name}`" not in text]
+    ours = [name for name in MODELS if MODELS.module(name).startswith("simgap.")]  # other tests may register more
+    assert ours
+    assert not [name for name in ours if f"`{name}`" not in text]
 
 
 @pytest.mark.parametrize(
