@@ -127,15 +127,23 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     rivals = [(with_effects - plain.held_out_errors(fit), fit) for fit in plain.orders]
     gain, best = max(rivals, key=_mean_gain)
     if not in_most(gain):
-        most = 0.0 if _needs_no_better(chosen) else BETTER  # a delay that scores higher is itself the linear model
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
-        alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= most]
+        alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= _most(chosen, fit)]
         if not alike:
             return None
         gain, best = max(alike, key=_mean_gain)
     if halves_speak_for(plain, chosen, best):
         return None
     return LinearRival.of(replace(plain, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
+
+
+def _most(chosen: Estimate, rival: Estimate) -> float:
+    """Return by how much effects may score higher than a linear model that does as well.
+
+    Of linear effects and a linear model that score alike, the one of fewer numbers is the better name.
+    """
+    fewer = chosen.plant.free.sum() < rival.plant.free.sum()
+    return 0.0 if fewer and _needs_no_better(chosen) else BETTER
 
 
 def _mean_gain(rival: tuple[np.ndarray, Estimate]) -> float:
