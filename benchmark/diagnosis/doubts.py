@@ -69,7 +69,7 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
 
 
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
-    """Tell in a sentence that the mean of a held-out record is a better model of it than the best plant, and why."""
+    """Tell in a sentence that the best plant beats the mean of a held-out record by no more than chance, and why."""
     baseline, trial = selection.baseline, selection.trial
     if in_most(baseline.blocks_of_mean - trial.blocks):
         return None

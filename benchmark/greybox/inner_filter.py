@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,7 @@ from simgap.greybox.effects.filtered_saturation import FilteredSaturation
 from simgap.greybox.effects.inner_saturation import InnerSaturation
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import as_good_as_best
-from simgap.greybox.linear import scaled
+from simgap.greybox.linear import with_plain
 from simgap.greybox.rivals import is_better_order
 from simgap.greybox.selection import Selection, select_around
 from simgap.greybox.terms import Term
@@ -67,7 +66,7 @@ def _fit(
     sections: Sequence[tuple[float, float]], plain: Estimate,
 ) -> tuple[Baseline, Estimate]:  # fmt: skip
     """Fit a plain model with a limit behind the best of several filters."""
-    baseline = replace(before, estimate=scaled(plain, before.train, channels, before.outputs))
+    baseline = with_plain(before, plain, channels)
     plant = baseline.plant.having([filtered])
     assert plant.scales is not None
     begun = []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from simgap.greybox import two_masses
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import block_errors
-from simgap.greybox.linear import WORTH_AN_ORDER, scaled
+from simgap.greybox.linear import WORTH_AN_ORDER, with_plain
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.problem import Problem
@@ -56,7 +55,7 @@ def with_joint(rigid: Selection, channels: Channels) -> Baseline | None:
                 best, least = fit, (1 - WORTH_AN_ORDER) * float(left.mean())
     if best is None:
         return None
-    return replace(baseline, estimate=scaled(_without_effects(best, baseline), records, channels, baseline.outputs))
+    return with_plain(baseline, _without_effects(best, baseline), channels)
 
 
 def _without_effects(fit: Estimate, baseline: Baseline) -> Estimate:

@@ -97,6 +97,11 @@ def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Seque
     return replace(plain, plant=replace(plain.plant, scales=scales_of(moved, problem, channels, outputs)))
 
 
+def with_plain(baseline: Baseline, plain: Estimate, channels: Channels) -> Baseline:
+    """Put another plain model into a baseline, and measure its scales."""
+    return replace(baseline, estimate=scaled(plain, baseline.train, channels, baseline.outputs))
+
+
 def _under_load(plain: Estimate, records: Records) -> Estimate:
     """Fit a constant force too, where the model without one explains less than half of the output.
 

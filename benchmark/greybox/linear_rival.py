@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.periodic_disturbance import PeriodicDisturbance
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
-from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, scaled
+from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, with_plain
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
 from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, halves_speak_for, score_gain
@@ -58,24 +59,25 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     linear = find_baseline(*whole, every_reading=not plain.outliers)
     if _swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
         return None
-    if _needs_no_better(chosen):
-        gain = plain.held_out_errors(chosen) - plain.held_out_errors(linear.estimate)
-        return LinearRival.of(linear, gain) if _far_beyond(plain, chosen, gain) else None
+    if _linear_or_visible(chosen):
+        with_effects, without, of_linear = map(plain.held_out_errors, (chosen, plain.estimate, linear.estimate))
+        far_beyond = _far_beyond(with_effects, without, of_linear)
+        return LinearRival.of(linear, with_effects - of_linear) if far_beyond else None
     return _unbeaten(plain, chosen, linear, channels)
 
 
-def _needs_no_better(chosen: Estimate) -> bool:
+def _linear_or_visible(chosen: Estimate) -> bool:
     """Tell whether effects are linear or show in the readings: then a linear model that does as well is no doubt."""
     return all(term.effect.linear or term.effect.visible_in_readings for term in chosen.plant.terms)
 
 
-def _far_beyond(plain: Baseline, chosen: Estimate, gain: np.ndarray) -> bool:
+def _far_beyond(with_effects: np.ndarray, without: np.ndarray, of_linear: np.ndarray) -> bool:
     """Tell whether a linear model errs so much less on held-out data that linear effects of few numbers are no name."""
-    left, without = (plain.held_out_errors(fit).mean() for fit in (chosen, plain.estimate))
+    gain = with_effects - of_linear
     error = gain.std() / math.sqrt(len(gain))
-    better = gain.mean() > max(WORTH_AN_ORDER * left, CONSISTENT * error)
-    beside_taken = gain.mean() > BEYOND * (without - left)
-    beside_left = left - gain.mean() < HALVES_LEAVE * left
+    better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
+    beside_taken = gain.mean() > BEYOND * (without.mean() - with_effects.mean())
+    beside_left = of_linear.mean() < HALVES_LEAVE * with_effects.mean()
     return bool(better and (beside_taken or beside_left))
 
 
@@ -84,16 +86,15 @@ def _unbeaten(plain: Baseline, chosen: Estimate, linear: Baseline, channels: Cha
 
     The simplest that is as good as the best but for chance may lack a pole which effects stand in for.
     """
-    with_effects = plain.held_out_errors(chosen)
-    gain = with_effects - plain.held_out_errors(linear.estimate)
-    if not _beaten(plain, chosen, gain, linear, linear.estimate):
+    gains = _gains(plain, chosen, (linear.estimate, *linear.orders))
+    gain, first = next(gains)
+    if not _beaten(plain, chosen, gain, linear, first):
         return LinearRival.of(linear, gain)
-    others = [(with_effects - plain.held_out_errors(fit), fit) for fit in linear.orders]
-    unbeaten = [(gain, fit) for gain, fit in others if not _beaten(plain, chosen, gain, linear, fit)]
+    unbeaten = [(gain, fit) for gain, fit in gains if not _beaten(plain, chosen, gain, linear, fit)]
     if not unbeaten:
         return None
-    gain, best = max(unbeaten, key=_mean_gain)
-    return LinearRival.of(replace(linear, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
+    gain, best = max(unbeaten, key=_mean)
+    return LinearRival.of(with_plain(linear, best, channels), gain)
 
 
 def _beaten(plain: Baseline, chosen: Estimate, gain: np.ndarray, linear: Baseline, fit: Estimate) -> bool:
@@ -123,18 +124,17 @@ def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | N
     plain, chosen = selection.baseline, selection.trial.estimate
     if not plain.orders or all(term.effect.visible_in_readings for term in chosen.plant.terms):
         return None
-    with_effects = plain.held_out_errors(chosen)
-    rivals = [(with_effects - plain.held_out_errors(fit), fit) for fit in plain.orders]
-    gain, best = max(rivals, key=_mean_gain)
+    rivals = list(_gains(plain, chosen, plain.orders))
+    gain, best = max(rivals, key=_mean)
     if not in_most(gain):
         alike = [(gain, fit) for gain, fit in rivals if not in_most(-gain)]
         alike = [(gain, fit) for gain, fit in alike if score_gain(plain, chosen, plain, fit) <= _most(chosen, fit)]
         if not alike:
             return None
-        gain, best = max(alike, key=_mean_gain)
+        gain, best = max(alike, key=_mean)
     if halves_speak_for(plain, chosen, best):
         return None
-    return LinearRival.of(replace(plain, estimate=scaled(best, plain.train, channels, plain.outputs)), gain)
+    return LinearRival.of(with_plain(plain, best, channels), gain)
 
 
 def _most(chosen: Estimate, rival: Estimate) -> float:
@@ -143,8 +143,14 @@ def _most(chosen: Estimate, rival: Estimate) -> float:
     Of linear effects and a linear model that score alike, the one of fewer numbers is the better name.
     """
     fewer = chosen.plant.free.sum() < rival.plant.free.sum()
-    return 0.0 if fewer and _needs_no_better(chosen) else BETTER
+    return 0.0 if fewer and _linear_or_visible(chosen) else BETTER
 
 
-def _mean_gain(rival: tuple[np.ndarray, Estimate]) -> float:
+def _gains(plain: Baseline, chosen: Estimate, fits: Sequence[Estimate]) -> Iterator[tuple[np.ndarray, Estimate]]:
+    """Yield linear models with how much less than the effects each errs on held-out blocks."""
+    with_effects = plain.held_out_errors(chosen)
+    yield from ((with_effects - plain.held_out_errors(fit), fit) for fit in fits)
+
+
+def _mean(rival: tuple[np.ndarray, Estimate]) -> float:
     return float(rival[0].mean())

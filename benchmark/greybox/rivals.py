@@ -11,7 +11,7 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.joint import on_joint, with_joint
 from simgap.greybox.leftover import look_for_more
-from simgap.greybox.linear import first_order_hold, scaled
+from simgap.greybox.linear import first_order_hold, with_plain
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.score_test import candidates
@@ -55,7 +55,7 @@ def _with_zeros(baseline: Baseline, channels: Channels) -> Baseline:
     The signs that the readings have lost are found with it where they are not with fewer poles and none of the zeros.
     """
     fit = _grown(baseline, range(1, MAX_ORDER + 1), with_zeros=True)
-    return replace(baseline, estimate=scaled(fit, baseline.train, channels, baseline.outputs))
+    return with_plain(baseline, fit, channels)
 
 
 def _grown(baseline: Baseline, orders: range, with_zeros: bool) -> Estimate:
@@ -95,7 +95,7 @@ def of_higher_order(selection: Selection, more: int, channels: Channels) -> Base
         return None
     fit = _grown(baseline, range(order + 1, order + more + 1), with_zeros=False)
     fit = first_order_hold(fit, records, baseline.valid, baseline.n_init) or fit
-    return replace(baseline, estimate=scaled(fit, records, channels, baseline.outputs))
+    return with_plain(baseline, fit, channels)
 
 
 def is_better_order(other: Selection, before: Selection) -> bool:
@@ -118,7 +118,7 @@ def of_several_masses(linear: Baseline, before: Selection, channels: Channels) -
     left = linear.held_out_errors
     fit = linear.estimate if linear.estimate in plants else min(plants, key=lambda fit: left(fit).mean())
     plain = replace(fit, plant=replace(fit.plant, kind="velocity"))
-    found = select(replace(linear, estimate=scaled(plain, linear.train, channels, linear.outputs)))
+    found = select(with_plain(linear, plain, channels))
     chosen = found.trial.estimate
     better = score_gain(found.baseline, chosen, linear, linear.estimate) > BETTER
     better = better and not in_most(left(chosen) - left(linear.estimate))

@@ -22,7 +22,7 @@ from simgap.diagnosis.diagnose import diagnose
 from simgap.records import Dataset, Experiment
 
 STICKS = "valve_stiction backlash hysteresis dead_zone"
-# The first names that are right, as those who measured the machine know; "" is none.
+# The first names that are right, as those who measured the machine know.
 RIGHT = {
     "dart_car": "coulomb_friction stribeck_friction dead_zone",
     "arm_pendulum": "gravity position_torque",
