@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import nnls
 
+from simgap.baselines.estimation.stacking import cross_validated, stacked
 from simgap.metrics import free_runs
 from simgap.protocol import as_chosen, is_stochastic
 from simgap.records import TrainingSet, UnusableInput
@@ -25,8 +25,9 @@ class Ensemble:
     y_hat = sum_i w_i y_hat_i, w_i >= 0, sum_i w_i = 1, by free runs over the validation data before these are estimated
     on. The seeds of one model share its bias: within a model w_i ~ 1 / mse_i (Bates and Granger 1969); the shares of
     the models have the least squared error (Breiman, Stacked regressions, 1996). Errors that models do not share
-    cancel: those of physics and of networks, those of two starts of one network. epochs, batches: of the networks among
-    them, shorter than alone, as they are many; 0 for what they do alone. Raises UnusableInput.
+    cancel: those of physics and of networks, those of two starts of one network. What it errs by on validation data
+    is cross-validated. epochs, batches: of the networks among them, shorter than alone, as they are many; 0 for what
+    they do alone. Raises UnusableInput.
     """
 
     quick: ClassVar = {"models": ("arx", "gru"), "epochs": 6, "batches": 20}
@@ -36,6 +37,7 @@ class Ensemble:
     batches: int = 40
     members: list[Any] = field(init=False, repr=False)
     weights: Float[np.ndarray, " M"] = field(init=False, repr=False)
+    held_out_error: float = field(init=False, repr=False)
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Fit the members with seeds of their own, and weigh them."""
@@ -50,6 +52,7 @@ class Ensemble:
         runs = [free_runs(member.simulate, held_out, data.n_init) for member in self._chosen.members]
         simulated, measured = np.array([one for one, _ in runs]), runs[0][1]
         self.weights = self._chosen.weights = stacked(self.models, simulated, measured)
+        self.held_out_error = cross_validated(self.models, simulated, measured)
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
@@ -80,23 +83,3 @@ class Ensemble:
     def fitted(self) -> dict[str, Any]:
         """The weight of each member, in the order of their fits."""
         return {"weights": self.weights.tolist()}
-
-
-def stacked(
-    models: Sequence[str], runs: Float[np.ndarray, "M N ny"], target: Float[np.ndarray, "N ny"]
-) -> Float[np.ndarray, " M"]:
-    """Weigh free runs of models, some of which have several; raises UnusableInput where all of them diverge."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        errors = np.square(runs - target).mean(axis=(1, 2))
-    finite = np.isfinite(errors)
-    if not finite.any():
-        raise UnusableInput("no member of the ensemble simulates the validation data")
-    worth = np.where(finite, 1 / np.maximum(errors, 1e-30), 0.0)
-    named = np.array([[name == model for name in models] for model in dict.fromkeys(models)]) & finite  # [K, M]
-    within = named[named.any(axis=1)] * worth
-    within /= within.sum(axis=1, keepdims=True)
-    means = np.tensordot(within, np.where(finite[:, None, None], runs, 0.0), 1).reshape(len(within), -1)
-    # Of sum w = 1 and the least squares, the first holds to a millionth, and then exactly.
-    much = 1e3 * (np.abs(means).max() or 1.0) * np.sqrt(target.size)
-    shares, _ = nnls(np.vstack((means.T, np.full(len(within), much))), np.append(target.ravel(), much))
-    return shares / shares.sum() @ within

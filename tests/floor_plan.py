@@ -28,7 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "subspace": {"records"},
     "greybox": GROUND | {"findings", "error_views", "subspace"},
     "error_views": {"records", "metrics", "wording"},
-    "baselines": GROUND | {"metrics", "data", "greybox", "subspace"},
+    "baselines": GROUND | {"metrics", "data", "error_views", "greybox", "subspace"},
     "neural": GROUND | {"data"},
     "saved": GROUND | RUN | {"data"},
     "exports": GROUND | RUN | {"data", "greybox", "saved"},

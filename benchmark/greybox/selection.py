@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from simgap.cores import on_cores
@@ -97,7 +97,7 @@ def select(baseline: Baseline, extended: Extended | None = None) -> Selection:
     # Where an exchange found a better fit, others may join that one; what is known beside this fit is not fitted again.
     larger = search.forward(trial, "forecast")
     trial = search.settled(larger, "forecast") if larger.terms != trial.terms else larger
-    trial = search.with_own(trial)
+    trial = search.refined(search.with_own(trial))
     return Selection(baseline, trial, search.noise_order, tuple(search.rounds), search.extended, search.parts)
 
 
@@ -144,6 +144,28 @@ class _Search:
         if larger.terms == trial.terms or larger.score < alone.score + BETTER:
             return alone
         return self.settled(self.forward(larger))
+
+    def refined(self, trial: Trial) -> Trial:
+        """Give each law more numbers where it has a form with more that says more; what that makes superfluous goes.
+
+        The causes have their names already: held-out free runs need not confirm them once more, only not deny the finer
+        law, and a cause goes where the score is no lower without it.
+        """
+        for term in trial.terms:
+            fit = refine(self.baseline, trial.estimate, term) if term in trial.terms else None
+            if fit is None:
+                continue
+            noise_order, coarse, (fine,) = judged(self.baseline, trial, [fit], self.noise_order)
+            if fine.score > coarse.score + BETTER and not in_most(fine.blocks - coarse.blocks):
+                self.noise_order, trial, self.parts = noise_order, fine, {}
+                while (fewer := self._without_one(trial)) and fewer.score >= trial.score:
+                    trial = fewer
+        return trial
+
+    def _without_one(self, trial: Trial) -> Trial | None:
+        """Take out the term without which the score is highest."""
+        smaller = on_cores(partial(without, self.baseline, trial, self.noise_order), trial.terms)
+        return max(smaller, key=lambda other: other.score, default=None)
 
     def _told_apart(self, trial: Trial) -> Trial:
         """Try what has own numbers in each experiment in the place of another, and laws with more of them."""
@@ -231,6 +253,19 @@ class _Search:
 
     def _without(self, trial: Trial, term: Term) -> Trial:
         return without(self.baseline, trial, self.noise_order, term)
+
+
+def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | None:
+    """Fit the form of a law that has more numbers, begun with the same law; None where there is none."""
+    part = estimate.plant.part_of(term)
+    numbers = term.effect.as_refined(estimate.theta[part]) if term not in estimate.plant.per_experiment else None
+    if numbers is None or term.effect.refined is None:
+        return None
+    fine = replace(term, effect=term.effect.refined())
+    plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
+    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+    theta[plant.part_of(fine)] = numbers
+    return baseline.fit(plant.terms, [(theta, local)])
 
 
 def _key(terms: Sequence[Term]) -> frozenset[tuple[str, int]]:

@@ -148,9 +148,14 @@ def score_model(
 
 
 def validation_error(model: Model, training: TrainingSet) -> float | None:
-    """Compute the error of the free run on validation data of the model as these chose it; None where there is none."""
+    """Compute the error of the free run on validation data of the model as these chose it; None where there is none.
+
+    It is what the model says that it is, where only a cross-validation can tell.
+    """
     if not any(len(x) > training.n_init for x in training.valid):
         return None
+    if isinstance(own := getattr(model, "held_out_error", None), float):
+        return own if math.isfinite(own) else None
     try:
         chosen = as_chosen(model)
         if chosen is None:

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from simgap.baselines.ensemble import Ensemble, stacked
+from simgap.baselines.ensemble import Ensemble
+from simgap.baselines.estimation.stacking import cross_validated, stacked
 from simgap.protocol import is_stochastic
 from simgap.records import Experiment, TrainingSet, UnusableInput
+from simgap.registry import MODELS
+from simgap.running.fitting import validation_error
 
 
 def experiment(seed):
@@ -42,6 +45,39 @@ def test_a_model_that_only_adds_to_the_error_of_another_has_no_weight():
     np.testing.assert_allclose(weights, [1.0, 0.0], atol=1e-9)
 
 
+def slow_noise(rng, count, n=4000, memory=0.97):
+    """Errors that remember about sixty samples, of variance 1."""
+    e = rng.standard_normal((count, n, 1)) * np.sqrt(1 - memory**2)
+    for k in range(1, n):
+        e[:, k] += memory * e[:, k - 1]
+    return e
+
+
+def test_the_error_on_validation_data_is_what_the_same_weights_err_by_on_new_data():
+    names, target, squares = ("a", "b", "c", "d", "e", "f"), np.zeros((4000, 1)), []
+    for seed in range(30):
+        runs = slow_noise(np.random.default_rng(seed), 6)
+        weights = stacked(names, runs[:, :400], target[:400])
+        of_mean = np.square(np.tensordot(weights, runs, 1))
+        held_out = cross_validated(names, runs[:, :400], target[:400])
+        squares.append((held_out**2, of_mean[:400].mean(), of_mean[600:].mean()))
+    held_out, same_data, new_data = np.sqrt(np.mean(squares, axis=0))
+    assert same_data < 0.75 * new_data  # the weights were estimated on the samples that judge them
+    assert held_out == pytest.approx(new_data, rel=0.15)
+
+
+def test_an_ensemble_of_one_model_errs_on_validation_data_as_that_does():
+    one, arx = Ensemble(models=("arx",)), MODELS["arx"]()
+    one.fit(DATA, 0)
+    arx.fit(DATA, 0)
+    assert validation_error(one, DATA) == pytest.approx(validation_error(arx, DATA))
+
+
+def test_the_error_of_an_ensemble_on_few_samples_is_that_of_the_plain_mean():
+    runs, target = np.array([[[1.0], [2.0]], [[3.0], [4.0]], [[np.nan], [0.0]]]), np.array([[2.5], [2.5]])
+    assert cross_validated(("a", "b", "c"), runs, target) == pytest.approx(np.sqrt(0.25))
+
+
 def test_its_simulation_is_the_weighted_mean():
     model, x = Ensemble(models=("arx", "mean")), experiment(3)
     model.fit(DATA, 0)
@@ -71,8 +107,6 @@ class Runaway:
 
 
 def test_a_member_that_runs_away_has_no_weight(monkeypatch):
-    from simgap.registry import MODELS
-
     monkeypatch.setitem(MODELS._targets, "runaway", Runaway)
     model, x = Ensemble(models=("arx", "runaway")), experiment(3)
     model.fit(DATA, 0)

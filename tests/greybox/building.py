@@ -21,7 +21,7 @@ from simgap.greybox.model import FittedPlant
 from simgap.greybox.samples import Records
 from simgap.greybox.score_test import candidates as _candidates
 from simgap.greybox.score_test import score_tests
-from simgap.greybox.selection import Selection, _Search, passes
+from simgap.greybox.selection import Selection, _Search, passes, select
 from simgap.greybox.trial import Trial, assess, assessed, squares_crosswise
 from simgap.greybox.trial import ranked as _ranked
 from simgap.greybox.trial import significant as _significant
@@ -240,3 +240,8 @@ def plant_with_interval(search, made):
 def share_left_over(search):
     """Share of the plain model's squared error that other forces of the input and the motion predict."""
     return _leftover.look_for_more(search.estimate, search.train).share
+
+
+def selected(train, valid, kind):
+    """The model with the effects that are chosen for these records."""
+    return select(plain_search(train, valid, kind)).trial

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import ClassVar, final
 
 import numpy as np
+from jaxtyping import Float
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.curved_input import (
+from simgap.greybox.effects.curve import (
     bent,
     curved,
     curved_step,
@@ -16,7 +17,9 @@ from simgap.greybox.effects.curved_input import (
     parameters_of_curve,
     starts_of_curve,
 )
-from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.fine_curve import refined_curve
+from simgap.greybox.effects.finely_curved_sensor import FinelyCurvedSensor
 from simgap.registry import EFFECTS
 
 
@@ -25,40 +28,15 @@ from simgap.registry import EFFECTS
 class CurvedSensor(OutputEffect):
     """d(reading)/dy = 1 + a (2 abs(z) - 1) + b (1 + a) z, z = (y - middle) / (half of the range): monotone."""
 
-    name: ClassVar[str] = "curved_sensor"
-    title: ClassVar[str] = "a curved characteristic of the sensor"
-    explanation: ClassVar[str] = (
-        "The reading follows a curve over the measured quantity instead of a straight line: a thermistor, a pitot tube "
-        "read as a pressure, an optical distance sensor, a linkage before a potentiometer."
-    )
-    reference: ClassVar[str] = (
-        "Wigren, Recursive prediction error identification using the nonlinear Wiener model, Automatica 29, 1993, eq. 2"
-    )
-    place_in_chain: ClassVar[int] = 115
+    name: ClassVar[str] = FinelyCurvedSensor.name
+    title: ClassVar[str] = FinelyCurvedSensor.title
+    explanation: ClassVar[str] = FinelyCurvedSensor.explanation
+    reference: ClassVar[str] = FinelyCurvedSensor.reference
+    place_in_chain: ClassVar[int] = FinelyCurvedSensor.place_in_chain
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (bent, curved_step)
-    shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level", "amplitude")
-    confounders: ClassVar[dict[str, str]] = {
-        "sensor_saturation": (
-            "move slowly beyond the largest reading: a saturated reading stands still, that of a curved sensor grows "
-            "less and less"
-        ),
-        "cubic_stiffness": (
-            "displace it far and a little and let it go: a spring changes how fast it swings, a curved sensor does not"
-        ),
-        "quadratic_stiffness": (
-            "displace it far and a little and let it go: a spring changes how fast it swings, a curved sensor does not"
-        ),
-        "quadratic_drag": (
-            "let it coast from several speeds: with drag the time until the reading has halved depends on the speed "
-            "itself, or compare the reading with a second sensor at several constant speeds"
-        ),
-        "sqrt_outflow": "compare the reading with a ruler at several levels: only that of a curved sensor is off",
-        "overflow": "compare the reading with a ruler at several levels: that of a curved sensor is off at all of them",
-        "quantisation": (
-            "move slowly: a coarse reading jumps from step to step everywhere, that of a curved sensor follows smoothly"
-        ),
-        "absolute_sensor": "move slowly through zero: a rectified reading turns back there, a curved one goes on",
-    }
+    refined: ClassVar[type[Effect] | None] = FinelyCurvedSensor
+    shows_in: ClassVar[tuple[ViewName, ...]] = FinelyCurvedSensor.shows_in
+    confounders: ClassVar[dict[str, str]] = FinelyCurvedSensor.confounders
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return how the gain rises to both ends and from end to end, each over its mean, and the range."""
@@ -71,6 +49,10 @@ class CurvedSensor(OutputEffect):
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the readings have a range."""
         return scales.y_high > scales.y_low
+
+    def as_refined(self, values: Float[np.ndarray, " 4"]) -> Float[np.ndarray, " 9"]:
+        """Return the numbers of the same curve by its gains at several places."""
+        return refined_curve(values)
 
     def describe(self, values: dict[str, float]) -> str:
         """Add how the gain changes over the range."""

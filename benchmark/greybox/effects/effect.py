@@ -183,6 +183,10 @@ class Effect(ABC):
         """Tell whether the effect makes sense on such a plant."""
         return True
 
+    def as_refined(self, values: np.ndarray) -> np.ndarray | None:
+        """Return its numbers as those of the refined law, where that contains it."""
+        return None
+
     @staticmethod
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:
         """Return what each of its own numbers adds [own, T] at the times t [T] of a record, both in s."""
