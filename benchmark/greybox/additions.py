@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -133,6 +134,19 @@ def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, speci
     part, shared = plant.part_of(special), list(general.effect.contains[special.effect.name])
     numbers = estimate.theta[estimate.plant.part_of(general)][shared]
     theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
+    return baseline.fit(plant.terms, [(theta, local)])
+
+
+def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | None:
+    """Fit the form of a law that has more numbers, begun with the same law; None where there is none."""
+    part = estimate.plant.part_of(term)
+    numbers = term.effect.as_refined(estimate.theta[part]) if term not in estimate.plant.per_experiment else None
+    if numbers is None or term.effect.refined is None:
+        return None
+    fine = replace(term, effect=term.effect.refined())
+    plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
+    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+    theta[plant.part_of(fine)] = numbers
     return baseline.fit(plant.terms, [(theta, local)])
 
 

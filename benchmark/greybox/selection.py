@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
@@ -15,6 +15,7 @@ from simgap.greybox.additions import (
     extend,
     from_other_poles,
     key_of,
+    refine,
     with_any_more,
 )
 from simgap.greybox.baseline import Baseline
@@ -253,19 +254,6 @@ class _Search:
 
     def _without(self, trial: Trial, term: Term) -> Trial:
         return without(self.baseline, trial, self.noise_order, term)
-
-
-def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | None:
-    """Fit the form of a law that has more numbers, begun with the same law; None where there is none."""
-    part = estimate.plant.part_of(term)
-    numbers = term.effect.as_refined(estimate.theta[part]) if term not in estimate.plant.per_experiment else None
-    if numbers is None or term.effect.refined is None:
-        return None
-    fine = replace(term, effect=term.effect.refined())
-    plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
-    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-    theta[plant.part_of(fine)] = numbers
-    return baseline.fit(plant.terms, [(theta, local)])
 
 
 def _key(terms: Sequence[Term]) -> frozenset[tuple[str, int]]:

@@ -85,13 +85,19 @@ def test_the_effects_of_a_model_pass_each_other_in_the_order_of_the_chain(tmp_pa
         ("velocity", ("valve_stiction", "rate_limit", "load_friction", "quadratic_drag", "quantisation")),
         ("two masses", ("actuator_lag", "coulomb_friction", "curved_sensor")),
         ("tanks", ("curved_input", "sqrt_outflow", "overflow", "sensor_saturation")),
+        ("tanks", ("finer curved_input", "sqrt_outflow", "overflow", "finer curved_sensor")),
+        ("velocity", ("finer inner_saturation", "coulomb_friction")),
         ("imposed", ("backlash", "coulomb_friction", "hysteresis")),
     ],
 )
 def test_in_c_it_runs_as_ours(plant, names, tmp_path):
     kind, order, *_ = PLANTS[plant]
-    terms = [EFFECTS[name]() for name in names]
-    model = grey_box(plant, terms, [values_of(term, scales(kind, order))[0] for term in terms])
+    finer = [name.startswith("finer ") for name in names]
+    of_name = [EFFECTS[name.removeprefix("finer ")] for name in names]
+    terms = [effect.refined() if fine else effect() for effect, fine in zip(of_name, finer, strict=True)]
+    sets = [values_of(term, scales(kind, order)) for term in terms]
+    # A finer law begins where it is still the simple one.
+    model = grey_box(plant, terms, [values[-1 if fine else 0] for values, fine in zip(sets, finer, strict=True)])
     u, y_init = record(plant)
 
     def compiled(after, start):

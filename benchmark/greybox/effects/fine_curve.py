@@ -39,15 +39,17 @@ def refined_curve(curve: Float[np.ndarray, " 4"]) -> Float[np.ndarray, " 9"]:
 def finely_curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Return the characteristic at x; it goes on straight beyond its range, and zero stays zero if it is inside.
 
-    Between two places its gain is linear: g(s) = g_0 + sum over k of c_k max(s - k, 0), s in pieces of the range.
+    Its gain is linear between two places, and so changes from the one to the other over a piece of the range.
     """
     gains, middle, half = p[: len(PLACES)], p[-2], p[-1]
     piece = 2 * half / PIECES
-    bends = np.diff(gains, 2, prepend=gains[0], append=gains[-1])
 
     def risen(x: float | np.ndarray) -> float | np.ndarray:
         s = (x - middle + half) / piece
-        return gains[0] * s + 0.5 * sum(c * np.maximum(s - k, 0.0) ** 2 for k, c in enumerate(bends))
+        rise = gains[0] * s
+        for k, change in enumerate(np.diff(gains)):
+            rise = rise + change * (0.5 * np.clip(s - k, 0.0, 1.0) ** 2 + np.maximum(s - k - 1, 0.0))
+        return rise
 
     rest = min(max(0.0, middle - half), middle + half)
     mean = np.mean(0.5 * (gains[1:] + gains[:-1]))
@@ -57,11 +59,9 @@ def finely_curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
 def risen(s, p, i):
     """Return how far the characteristic rises from the low end to s, in pieces of the range."""
     rise = p[i] * s
-    for k in range(7):
-        before = p[i + k] - p[i + max(k - 1, 0)]
-        after = p[i + min(k + 1, 6)] - p[i + k]
-        beyond = max(s - k, 0.0)
-        rise = rise + 0.5 * (after - before) * beyond * beyond
+    for k in range(6):
+        inside = min(max(s - k, 0.0), 1.0)
+        rise = rise + (p[i + k + 1] - p[i + k]) * (0.5 * inside * inside + max(s - k - 1.0, 0.0))
     return rise
 
 
