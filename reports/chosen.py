@@ -10,10 +10,10 @@ from simgap.reports.tables import Cell, Table, experiment_groups, spread_cell, u
 
 HOW_TO_READ = (
     "Rows: how many have an error on the validation data. Chosen: the one whose free run errs least on them, in the "
-    "median over its seeds, estimated on the training data alone with all else as validation data chose it. The test "
-    "had no part in it. RMSE and fit: on the test, of the row as committed, estimated on the validation data too "
-    "where a model does that. With several seeds: median (range). Best on the test: found with the test, which "
-    "nobody can do in practice."
+    "median over its seeds, estimated on the training data alone with all else as validation data chose it; that of an "
+    "ensemble, whose weights are estimated on them, is cross-validated. The test had no part in it. RMSE and fit: on "
+    "the test, of the row as committed, estimated on the validation data too where a model does that. With several "
+    "seeds: median (range). Best on the test: found with the test, which nobody can do in practice."
 )
 
 
