@@ -120,7 +120,7 @@ def test_the_way_from_measured_records_ends_with_the_numbers_that_it_shows(folde
     (shown,) = (block.text for block in BLOCKS if block.language == "text" and "square-root share" in block.text)
     assert not [line for line in shown.splitlines() if line != "..." and line not in said]
     assert "0.605 V" in said
-    assert float(re.search(r"differs by (\S+) ", said)[1]) < 1e-12
+    assert "differs by 0 " in said
 
 
 def test_its_model_in_baselines_is_registered_by_that_one_file(folder):

@@ -44,13 +44,13 @@ def cross_validated(
     Chow and Nolan, A cross-validatory method for dependent data, Biometrika 81, 1994). Without a rest all models are
     worth the same. Raises UnusableInput as `stacked` does.
     """
-    finite = np.isfinite(runs).all(axis=(1, 2))
-    weights = stacked(models, runs, target)
-    error = np.tensordot(weights[finite], runs[finite], 1) - target
+    finite = [i for i, run in enumerate(runs) if np.isfinite(run).all()]
+    models, runs = [models[i] for i in finite], runs[finite]
+    error = np.tensordot(stacked(models, runs, target), runs, 1) - target
     memory = max(correlation_time(of_output, [len(error)], 0)[0] for of_output in error.T)
     at = np.arange(len(target))
     for piece in np.array_split(at, min(PIECES, len(at))):
         far = (at < piece[0] - memory) | (at > piece[-1] + memory)
-        of_rest = stacked(models, runs[:, far], target[far]) if far.any() else finite / finite.sum()
-        error[piece] = np.tensordot(of_rest[finite], runs[finite][:, piece], 1) - target[piece]
+        of_rest = stacked(models, runs[:, far], target[far]) if far.any() else np.full(len(runs), 1 / len(runs))
+        error[piece] = np.tensordot(of_rest, runs[:, piece], 1) - target[piece]
     return math.sqrt(np.mean(np.square(error)))

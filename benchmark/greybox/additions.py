@@ -139,11 +139,10 @@ def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, speci
 
 def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | None:
     """Fit the form of a law that has more numbers, begun with the same law; None where there is none."""
-    part = estimate.plant.part_of(term)
-    numbers = term.effect.as_refined(estimate.theta[part]) if term not in estimate.plant.per_experiment else None
-    if numbers is None or term.effect.refined is None:
+    law, numbers = term.effect.refined, term.effect.as_refined(estimate.theta[estimate.plant.part_of(term)])
+    if law is None or numbers is None:
         return None
-    fine = replace(term, effect=term.effect.refined())
+    fine = replace(term, effect=law())
     plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
     theta[plant.part_of(fine)] = numbers

@@ -41,19 +41,19 @@ def finely_curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
 
     Its gain is linear between two places, and so changes from the one to the other over a piece of the range.
     """
-    gains, middle, half = p[: len(PLACES)], p[-2], p[-1]
-    piece = 2 * half / PIECES
+    gains, low, piece = p[: len(PLACES)], p[-2] - p[-1], p[-1] / 3.0
 
-    def risen(x: float | np.ndarray) -> float | np.ndarray:
-        s = (x - middle + half) / piece
+    def risen(s: float | np.ndarray) -> float | np.ndarray:
         rise = gains[0] * s
-        for k, change in enumerate(np.diff(gains)):
-            rise = rise + change * (0.5 * np.clip(s - k, 0.0, 1.0) ** 2 + np.maximum(s - k - 1, 0.0))
+        for k in range(PIECES):
+            inside = np.clip(s - k, 0.0, 1.0)
+            rise = rise + (gains[k + 1] - gains[k]) * (0.5 * inside * inside + np.maximum(s - k - 1.0, 0.0))
         return rise
 
-    rest = min(max(0.0, middle - half), middle + half)
-    mean = np.mean(0.5 * (gains[1:] + gains[:-1]))
-    return rest + piece / mean * (risen(x) - risen(rest))
+    # Operation by operation what the step below does, so that an export differs by nothing.
+    rest = min(max(0.0, low), low + 6.0 * piece)
+    mean = risen(6.0) / 6.0
+    return rest + piece / mean * (risen((x - low) / piece) - risen((rest - low) / piece))
 
 
 def risen(s, p, i):
