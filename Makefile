@@ -21,7 +21,8 @@ INSTALLED := $(VENV)/installed-$(VERSION)
 
 help:
 	@echo "make benchmark   quick models on all data sets at hand, as tables in the terminal and in results/"
-	@echo "make test        the tests; make test-slow for those that take minutes, after make peers with SIPPY"
+	@echo "make test        the tests; make test-slow for those that take minutes, after make peers with SIPPY;"
+	@echo "                 MINUTES=30 leaves out what has not begun by then"
 	@echo "make lint        format, style and types; make dev sets up .venv and stops"
 	@echo "make speed       times beside those of other tools, with make peers"
 	@echo "make peers       those other tools into .venv"
@@ -37,7 +38,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 	    "name another: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1;; esac
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	  echo "'$(PYTHON)' cannot make virtual environments; on Debian and Ubuntu install python3-venv" >&2; exit 1; }
-	@echo "Setting up $(VENV) with Python $(VERSION), about a minute ..."
+	@echo "Setting up $(VENV) with Python $(VERSION), one to three minutes ..."
 	@rm -rf $(VENV)
 	@$(PYTHON) -m venv $(VENV)
 	@$(PIP) install --quiet $$(grep '^setuptools==' requirements.lock)
@@ -52,10 +53,10 @@ $(VENV)/peers-$(VERSION): requirements-peers.lock $(INSTALLED)
 
 test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
-	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
+	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist worksteal
 
 test-slow: $(INSTALLED)
-	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow --numprocesses $(JOBS) --dist worksteal
+	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow $(addprefix --minutes=,$(MINUTES)) --numprocesses $(JOBS) --dist worksteal
 
 # After an interruption, or with one more model, only what is not in results/ yet is run. A failed job (1) is a row of
 # the tables, so they are shown all the same. Where there is no terminal, its width does not hide columns.

@@ -1,7 +1,9 @@
 """Shapes and types of every public function are checked while the tests run, and only then."""
 
+import math
 import os
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -9,15 +11,19 @@ from floor_plan import ROOT, modules
 from jaxtyping import install_import_hook
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-# Called a hundred thousand times by one search; checks would make them five times as slow.
-INSIDE_A_FIT = (
-    "greybox.fitting", "greybox.levenberg", "greybox.machine", "greybox.noise", "greybox.normal_equations",
-    "greybox.plant", "greybox.problem", "greybox.samples", "greybox.simulation", "greybox.terms", "greybox.two_masses",
-    "baselines.estimation.block_error", "baselines.estimation.block_search", "baselines.estimation.blocks",
-    "baselines.estimation.box_jenkins_error", "baselines.estimation.filters", "baselines.estimation.gram",
-    "baselines.estimation.levenberg", "baselines.estimation.monomials", "baselines.estimation.narx_error",
-    "baselines.estimation.output_error", "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
+# Called a hundred thousand times by one search, or by one report; checks would make them five times as slow. What is
+# checked elsewhere defines no function inside one that a search calls often: it would be compiled anew at every call.
+CALLED_OFTEN = (
+    "greybox.drive", "greybox.effects.absolute_sensor", "greybox.effects.curve", "greybox.effects.curved_sensor",
+    "greybox.effects.effect", "greybox.effects.fine_curve", "greybox.fitting", "greybox.levenberg", "greybox.machine",
+    "greybox.noise", "greybox.normal_equations", "greybox.plant", "greybox.problem", "greybox.samples",
+    "greybox.simulation", "greybox.terms", "greybox.two_masses", "baselines.estimation.block_error",
+    "baselines.estimation.block_search", "baselines.estimation.blocks", "baselines.estimation.box_jenkins_error",
+    "baselines.estimation.filters", "baselines.estimation.gram", "baselines.estimation.levenberg",
+    "baselines.estimation.monomials", "baselines.estimation.narx_error", "baselines.estimation.output_error",
+    "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
     "baselines.estimation.state_space_error", "baselines.estimation.thresholding", "subspace.state_space",
+    "results.store", "reports.pooling",
 )  # fmt: skip
 # Compare the sizes of all attributes of a saved model; with each of their calls checked, each would stand alone.
 CHECKS_ITSELF = ("saved.codec", "running.annotations")
@@ -25,7 +31,7 @@ CHECKS_ITSELF = ("saved.codec", "running.annotations")
 
 def _modules() -> list[str]:
     """Every module but the command line, numba kernels (a checked function cannot be compiled) and those above."""
-    unchecked = {f"simgap.{name}" for name in (*INSIDE_A_FIT, *CHECKS_ITSELF)}
+    unchecked = {f"simgap.{name}" for name in (*CALLED_OFTEN, *CHECKS_ITSELF)}
     return [
         name for name, path in modules().items()
         if not (path.stem.endswith("kernels") or path.stem == "__init__" or name in unchecked or ".cli." in name)
@@ -33,6 +39,21 @@ def _modules() -> list[str]:
 
 
 install_import_hook(_modules(), "beartype.beartype")
+
+
+def pytest_addoption(parser):
+    parser.addoption("--minutes", type=float, default=math.inf, help="skip what has not begun by then")
+
+
+def pytest_configure(config):
+    config.begun = time.monotonic()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    minutes = item.config.getoption("minutes")
+    if time.monotonic() - item.config.begun > 60 * minutes:
+        pytest.skip(f"{item.path.name}: left out, {minutes:g} minutes are over")
 
 
 @pytest.fixture(scope="session")

@@ -45,11 +45,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
 
 def _has_room(term: Term, terms: Sequence[Term]) -> bool:
     """Tell whether the compiled loop has room for this force beside those of other terms."""
-
-    def in_loop(one: Term) -> bool:
-        return one.effect.port == "force" and not one.effect.own
-
-    return not in_loop(term) or sum(in_loop(other) and not term.replaces(other) for other in terms) < SLOTS
+    return not term.in_loop or sum(other.in_loop and not term.replaces(other) for other in terms) < SLOTS
 
 
 def score_tests(baseline: Baseline, estimate: Estimate, terms: Sequence[Term]) -> list[list[Scored]]:

@@ -32,6 +32,11 @@ class Term:
         """Name and channel; a model has each term once."""
         return self.effect.name, self.channel
 
+    @property
+    def in_loop(self) -> bool:
+        """Whether the compiled loop works it out, as a force by the state of the plant."""
+        return self.effect.port == "force" and not self.effect.own
+
     def replaces(self, other: Term) -> bool:
         """Tell whether this effect contains the other one as a special case."""
         return other.effect.name in self.effect.contains

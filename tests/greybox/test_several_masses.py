@@ -80,6 +80,7 @@ def test_nothing_is_named_where_such_a_drive_has_no_friction(seed):
     assert effects_of(drive(seed, 0.0))[1] == []
 
 
+@pytest.mark.slow
 def test_the_friction_of_the_coupled_drives_is_found_behind_a_sensor_that_loses_the_sign(measured):
     order, effects = effects_of(load("ced"))
     assert order == 3

@@ -33,15 +33,15 @@ def curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Return the characteristic at x; it goes on straight beyond its range, and zero stays zero if it is inside."""
     ends, tilt, middle, half = p
     tilt = tilt * (1 + ends)  # so that no gain is negative, and every one that is not has its two numbers
-
-    def curve(z: float | np.ndarray) -> float | np.ndarray:
-        inside = np.clip(z, -1.0, 1.0)
-        size = np.abs(inside)
-        slope = 1 + ends * (2 * size - 1) + tilt * inside
-        return inside * (1 + ends * (size - 1)) + 0.5 * tilt * inside * inside + slope * (z - inside)
-
     rest = min(max(0.0, middle - half), middle + half)
-    return rest + half * (curve((x - middle) / half) - curve((rest - middle) / half))
+    return rest + half * (_curve((x - middle) / half, ends, tilt) - _curve((rest - middle) / half, ends, tilt))
+
+
+def _curve(z: float | np.ndarray, ends: float, tilt: float) -> float | np.ndarray:
+    inside = np.clip(z, -1.0, 1.0)
+    size = np.abs(inside)
+    slope = 1 + ends * (2 * size - 1) + tilt * inside
+    return inside * (1 + ends * (size - 1)) + 0.5 * tilt * inside * inside + slope * (z - inside)
 
 
 def bent(z, ends, tilt):

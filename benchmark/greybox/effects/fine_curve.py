@@ -42,18 +42,18 @@ def finely_curved(x: np.ndarray, p: np.ndarray) -> np.ndarray:
     Its gain is linear between two places, and so changes from the one to the other over a piece of the range.
     """
     gains, low, piece = p[: len(PLACES)], p[-2] - p[-1], p[-1] / 3.0
-
-    def risen(s: float | np.ndarray) -> float | np.ndarray:
-        rise = gains[0] * s
-        for k in range(PIECES):
-            inside = np.clip(s - k, 0.0, 1.0)
-            rise = rise + (gains[k + 1] - gains[k]) * (0.5 * inside * inside + np.maximum(s - k - 1.0, 0.0))
-        return rise
-
     # Operation by operation what the step below does, so that an export differs by nothing.
     rest = min(max(0.0, low), low + 6.0 * piece)
-    mean = risen(6.0) / 6.0
-    return rest + piece / mean * (risen((x - low) / piece) - risen((rest - low) / piece))
+    mean = _risen(6.0, gains) / 6.0
+    return rest + piece / mean * (_risen((x - low) / piece, gains) - _risen((rest - low) / piece, gains))
+
+
+def _risen(s: float | np.ndarray, gains: np.ndarray) -> float | np.ndarray:
+    rise = gains[0] * s
+    for k in range(PIECES):
+        inside = np.clip(s - k, 0.0, 1.0)
+        rise = rise + (gains[k + 1] - gains[k]) * (0.5 * inside * inside + np.maximum(s - k - 1.0, 0.0))
+    return rise
 
 
 def risen(s, p, i):
