@@ -78,17 +78,21 @@ def without_words(value: Any) -> Any:
     return [without_words(part) for part in value] if isinstance(value, list) else value
 
 
-def differences(kept: Any, now: Any, at: str = "", relative: float = 1e-6) -> list[str]:
-    """Where two answers differ: names at all, numbers by more than `relative`."""
+def differences(kept: Any, now: Any, at: str = "") -> list[str]:
+    """Where two answers differ: names at all, shares of an error by over 1e-4, other numbers by over 1e-4 of them.
+
+    Another processor moves a number that the record hardly tells by 3e-5 of it.
+    """
     if isinstance(kept, dict) and isinstance(now, dict):
         missing = [f"{at}.{key} is only in one" for key in kept.keys() ^ now.keys()]
-        return missing + [d for key in kept.keys() & now.keys()
-                          for d in differences(kept[key], now[key], f"{at}.{key}", relative)]  # fmt: skip
+        return missing + [
+            d for key in kept.keys() & now.keys() for d in differences(kept[key], now[key], f"{at}.{key}")
+        ]
     if isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
-        return [d for i, pair in enumerate(zip(kept, now, strict=True))
-                for d in differences(*pair, f"{at}[{i}]", relative)]  # fmt: skip
+        return [d for i, pair in enumerate(zip(kept, now, strict=True)) for d in differences(*pair, f"{at}[{i}]")]
     numbers = isinstance(kept, int | float) and isinstance(now, int | float)
-    same = abs(kept - now) <= relative * max(abs(kept), abs(now), 1e-6) if numbers and kept != now else kept == now
+    least = 1.0 if at.startswith(".budget") else 1e-6
+    same = abs(kept - now) <= 1e-4 * max(abs(kept), abs(now), least) if numbers and kept != now else kept == now
     return [] if same else [f"{at}: {kept!r} is now {now!r}"]
 
 
