@@ -53,7 +53,7 @@ $(VENV)/peers-$(VERSION): requirements-peers.lock $(INSTALLED)
 
 test: $(INSTALLED)
 	@echo "Slow tests are left out; make test-slow runs them."
-	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist worksteal
+	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m "not slow" --numprocesses $(JOBS) --dist loadfile
 
 test-slow: $(INSTALLED)
 	@OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest -q -m slow $(addprefix --minutes=,$(MINUTES)) --numprocesses $(JOBS) --dist worksteal
