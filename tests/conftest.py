@@ -10,9 +10,10 @@ import pytest
 from floor_plan import ROOT, modules
 from jaxtyping import install_import_hook
 
+BEGUN = time.monotonic()
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-# Called a hundred thousand times by one search, or by one report; checks would make them five times as slow. What is
-# checked elsewhere defines no function inside one that a search calls often: it would be compiled anew at every call.
+# Called a hundred thousand times by one search or one report; checks would make them several times as slow. Where a
+# search calls often, what is checked must define no function inside another: it is compiled anew at every call.
 CALLED_OFTEN = (
     "greybox.drive", "greybox.effects.absolute_sensor", "greybox.effects.curve", "greybox.effects.curved_sensor",
     "greybox.effects.effect", "greybox.effects.fine_curve", "greybox.fitting", "greybox.levenberg", "greybox.machine",
@@ -45,14 +46,10 @@ def pytest_addoption(parser):
     parser.addoption("--minutes", type=float, default=math.inf, help="skip what has not begun by then")
 
 
-def pytest_configure(config):
-    config.begun = time.monotonic()
-
-
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
     minutes = item.config.getoption("minutes")
-    if time.monotonic() - item.config.begun > 60 * minutes:
+    if time.monotonic() - BEGUN > 60 * minutes:
         pytest.skip(f"{item.path.name}: left out, {minutes:g} minutes are over")
 
 
