@@ -18,6 +18,7 @@ Status = Literal["ok", "diverged", "error", "timeout"]
 
 # No measurement is larger; squares and sums of squares of such values still fit into float64.
 LARGEST_VALUE = 1e100
+LONGEST_NAME = 80  # of a data set, in characters
 
 # Relative difference of two sampling times that is the jitter of one clock: each is read off time stamps of a record.
 CLOCK_JITTER = 1e-4
@@ -160,10 +161,9 @@ class Dataset:
     def __post_init__(self) -> None:
         object.__setattr__(self, "test", tuple(self.test))
         # The name becomes a path and a page title, so it may hold nothing that means something there.
-        if not re.fullmatch(r"[A-Za-z0-9][\w.\- ]{0,79}", self.name):
-            raise UnusableInput(
-                f"the data set name {self.name!r} is not usable; use letters, digits, '_', '-', '.', at most 80"
-            )
+        if len(self.name) > LONGEST_NAME or not re.fullmatch(r"[^\W_][\w.\- ]*", self.name):
+            raise UnusableInput(f"the data set name {self.name!r} is not usable; use letters, digits, '_', '-', '.', "
+                                f"at most {LONGEST_NAME}")  # fmt: skip
         if not self.test:
             raise UnusableInput(f"{self.name}: the test split is empty; give at least one test experiment")
         _check_alike(self.training.train + self.test, self.channels)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from simgap.data.formats.tables import Table
 from simgap.data.kinds import told, with_kinds
 from simgap.data.named import is_registered, load_registered
 from simgap.data.simulated_columns import split_off
-from simgap.records import Channels, Dataset, Experiment, UnusableInput
+from simgap.records import LONGEST_NAME, Channels, Dataset, Experiment, UnusableInput
 from simgap.registry import DATASETS
 
 Kinds = str | Mapping[str, str] | None
@@ -99,12 +100,17 @@ def read(
     else:
         choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
         record = record_of_logs(read_tables(source, choices), choices)
-        dataset, said = dataset_of(record, name or Path(record.source).stem), record.said
+        dataset, said = dataset_of(record, name or _name_of(Path(record.source))), record.said
     theirs = None
     if simulated:
         dataset, theirs = split_off(dataset, simulated)
     dataset = with_known(with_kinds(dataset, kind), known)
     return Reading(dataset, (*told(dataset.channels), *said), theirs)
+
+
+def _name_of(file: Path) -> str:
+    """Name a data set after its file: "log (1).csv" becomes "log 1"."""
+    return re.sub(r"[^\w.\-]+", " ", file.stem)[:LONGEST_NAME].strip(" ._-") or "record"
 
 
 def read_recordings(

@@ -69,7 +69,7 @@ def assemble(
 ) -> Dataset:
     """Make a data set of training, validation and test experiments; `source` names it in the messages.
 
-    Raises UnusableInput when an experiment is not longer than n_init or an input never moves in training.
+    Raises UnusableInput when an experiment is not longer than n_init or a signal never moves in training.
     """
     train, valid, test = map(tuple, splits)
     every = train + valid + test
@@ -80,11 +80,16 @@ def assemble(
                 f"{source}: experiment {experiment.name} has {len(experiment)} rows, no more than the "
                 f"{n_init} (n_init) that start a simulation; record longer experiments or lower n_init"
             )
-    for column, channel in enumerate(channels.inputs):
-        values = np.concatenate([experiment.u[:, column] for experiment in train])
-        if values.min() == values.max():
-            raise UnusableInput(
-                f"{source}: input column {channel.name!r} is {values[0]} in all {len(values)} rows of the "
-                f"training split; leave it out of the inputs or record it while it moves"
-            )
+    _check_that_all_move(train, channels, source)
     return Dataset(name, TrainingSet(train, valid, n_init, channels), test, n_init, channels)
+
+
+def _check_that_all_move(train: Experiments, channels: Channels, source: str) -> None:
+    for what, signal, listed in (("input", "u", channels.inputs), ("output", "y", channels.outputs)):
+        values = np.concatenate([getattr(experiment, signal) for experiment in train])  # [T, n]
+        for column, channel in enumerate(listed):
+            if np.ptp(values[:, column]) == 0:
+                raise UnusableInput(
+                    f"{source}: {what} column {channel.name!r} is {values[0, column]} in all {len(values)} rows of the "
+                    f"training split; leave it out of the {what}s or record it while it moves"
+                )

@@ -24,7 +24,10 @@ Outputs = Annotated[list[str] | None, typer.Option("--output", help="Output colu
 SamplingTime = Annotated[float | None, typer.Option("--dt", help="Sampling time of a CSV file in seconds.")]
 KindOf = Annotated[
     list[str] | None,
-    typer.Option("--kind", help="What an output is: NAME=position, velocity, level or other; repeatable."),
+    typer.Option(
+        "--kind",
+        help="What the output is: position, velocity, level or other; NAME=KIND where there are several; repeatable.",
+    ),
 ]
 Resample = Annotated[
     float | None, typer.Option("--resample", metavar="DT", help="Interpolate onto an even grid of DT seconds.")
@@ -34,7 +37,7 @@ KnownOf = Annotated[
     typer.Option("--known", help="What is known of the machine: mass=0.5kg, arm=0.1m, controller.goal=r; repeatable."),
 ]
 SplitGaps = Annotated[bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time.")]
-Json = Annotated[Path | None, typer.Option("--json", help="Write the same for machines into this file.")]
+Json = Annotated[Path | None, typer.Option("--json", help="Write the same as JSON into this file.")]
 
 
 def names(text: str | None) -> list[str] | None:

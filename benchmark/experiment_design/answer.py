@@ -69,7 +69,7 @@ class NextRecord:
         np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join([time, *names]), comments="")
 
     def to_json(self) -> dict[str, Any]:
-        """Return the same for machines."""
+        """Return the same as JSON."""
         limits, inputs, outputs = self.limits, self.channels.inputs, self.channels.outputs
         return {
             "schema": 1,

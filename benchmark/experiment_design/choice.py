@@ -48,7 +48,7 @@ class Choice:
         return self.names[0]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the same for machines."""
+        """Return the same as JSON."""
         ranked = [{"name": name, "left": left} for name, left in zip(self.names, self.left, strict=True)]
         return {"schema": 1, "dataset": self.dataset, "effects": list(self.effects), "candidates": ranked,
                 "taken": list(self.taken)}  # fmt: skip

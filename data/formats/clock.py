@@ -20,7 +20,9 @@ from simgap.records import UnusableInput
 DATE = re.compile(r"\s*\d{1,4}[-./:]\d{1,2}[-./:]\d|\s*\d{1,2}:\d\d")
 YEAR_FIRST = re.compile(r"(\d{4})/(\d\d)/(\d\d)")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
+TIME_OF_DAY = re.compile(r"\s*\d{1,2}:\d\d:")
 MICROSECOND = timedelta(microseconds=1)
+DAY = timedelta(days=1) // MICROSECOND
 # Numbers without a unit that lie within the years 2000 to 2100 when they count milliseconds since 1970: no record in
 # seconds gets there.
 EPOCH = (946_684_800, 4_102_444_800)
@@ -104,14 +106,17 @@ def _stamps(cells: Sequence[str]) -> Int64[np.ndarray, " T"]:
     for index, stamp in enumerate(stamps):
         if (stamp.tzinfo is None) != (stamps[0].tzinfo is None):
             raise BadCell(index, "some times have a time zone and some have none; write all alike")
-    return np.array([(stamp - stamps[0]) // MICROSECOND for stamp in stamps], dtype=np.int64)
+    since = np.array([(stamp - stamps[0]) // MICROSECOND for stamp in stamps], dtype=np.int64)
+    if TIME_OF_DAY.match(cells[0]):
+        since += np.concatenate(([0], np.cumsum(np.diff(since) < -DAY // 2))) * DAY  # a night that was recorded through
+    return since
 
 
 def _stamp(index: int, cell: str) -> datetime:
     text = DAY_FIRST.sub(lambda day: f"{day[3]}-{int(day[2]):02d}-{int(day[1]):02d}", cell.strip())
     text = YEAR_FIRST.sub(r"\1-\2-\3", text)
     try:
-        if re.match(r"\d{1,2}:\d\d:", text):
+        if TIME_OF_DAY.match(text):
             return datetime.combine(datetime(2000, 1, 1), time.fromisoformat(text.zfill(len(text) + (text[1] == ":"))))
         return datetime.fromisoformat(text)
     except ValueError:

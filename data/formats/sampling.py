@@ -10,6 +10,7 @@ from simgap.records import UnusableInput
 
 STEP_TOLERANCE = 0.1  # of dt, for each step
 DRIFT_TOLERANCE = 0.01  # of dt, for the mean step
+ROUNDING = 1e-9  # of a tolerance: a clock that counts whole milliseconds may be off by just 10 % of 10 ms
 GAP = 1.5  # usual steps that are a gap between samples of an even clock
 DIGITS = 12  # of a sampling time that is read off a clock
 
@@ -63,7 +64,8 @@ def check_steps(clock: Clock, dt: float, remedy: str = "") -> None:
     """Raise UnusableInput unless every step is dt to 10 %; the remedy is by default the option that helps."""
     t, table = clock.seconds, clock.table
     steps = np.diff(t)
-    wrong = np.flatnonzero(~((steps > 0) & (np.abs(steps - dt) <= STEP_TOLERANCE * dt)))
+    tolerance = STEP_TOLERANCE * dt * (1 + ROUNDING) + 2 * clock.resolution
+    wrong = np.flatnonzero(~((steps > 0) & (np.abs(steps - dt) <= tolerance)))
     if not wrong.size:
         return
     i = int(wrong[0])

@@ -38,6 +38,8 @@ def fetch(name: str) -> Path:
     found = source.folder()
     if found is not None:
         return found
+    if source.download is None:
+        raise UnusableInput(source.why_missing())
     folder = cache() / source.collection
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -50,6 +52,9 @@ def fetch(name: str) -> Path:
             source.build(Path(fresh))
             _move_into(Path(fresh), folder)
     except Exception as error:  # a download fails in any way, and all of them mean the same
+        for empty in (folder, folder.parent):
+            with contextlib.suppress(OSError):
+                empty.rmdir()
         raise UnusableInput(
             f"{name} could not be downloaded ({one_line(error)}); try again later, "
             f"or get it by hand from {source.where} and put {', '.join(source.patterns)} into {folder}"

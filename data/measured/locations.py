@@ -21,13 +21,14 @@ class Source:
     """The files that a measured data set is read from.
 
     `patterns` are globs below the folder of the collection; each must match a file. `download(folder)` puts
-    the files into an empty folder; `where` tells people where to find them by hand.
+    the files into an empty folder; there is none where the owners state no licence. `where` tells people where to find
+    them by hand.
     """
 
     name: str
     collection: str
     patterns: tuple[str, ...]
-    download: Callable[[Path], None]
+    download: Callable[[Path], None] | None
     where: str
     build: Callable[[Path], Dataset]
 
@@ -47,6 +48,9 @@ class Source:
         """Say how to get the files in one sentence; empty when they are at hand."""
         if self.folder() is not None:
             return ""
+        if self.download is None:
+            return (f"{self.name} is not at hand; its owners state no licence, so clone {self.where} yourself and set "
+                    f"SIMGAP_DATA to the clone")  # fmt: skip
         return f"{self.name} is not at hand; get it with `simgap data fetch {self.name}`"
 
     def read(self, folder: Path) -> Dataset:
@@ -67,7 +71,7 @@ class Source:
 
 
 def reads(
-    collection: str, *patterns: str, download: Callable[[Path], None], where: str
+    collection: str, *patterns: str, download: Callable[[Path], None] | None, where: str
 ) -> Callable[[Callable[[Path], Dataset]], Callable[..., Dataset]]:
     """Turn `name(folder) -> Dataset` into `name(n_init=0) -> Dataset`, which finds its folder or raises Missing.
 

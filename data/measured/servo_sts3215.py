@@ -36,12 +36,8 @@ CHANNELS = Channels(
 )  # fmt: skip
 
 
-def _no_download(folder: Path) -> None:
-    raise UnusableInput(f"its owners state no licence, so clone {SITE} yourself and set SIMGAP_DATA to the clone")
-
-
 @DATASETS.register("sts3215")
-@reads("sysid", f"{RAW}/*.json", download=_no_download, where=SITE)
+@reads("sysid", f"{RAW}/*.json", download=None, where=SITE)
 def sts3215(folder: Path) -> Dataset:
     """STS3215: a hobby servo with its position controller inside, moving a pendulum.
 

@@ -67,7 +67,7 @@ def test_a_failed_download_leaves_nothing_and_says_where_to_get_it_by_hand(site,
         fetch("daisy_ballbeam")
     assert len(str(caught.value).splitlines()) == 1
     assert str(no_files / "daisy") in str(caught.value)
-    assert not [file for file in no_files.rglob("*") if file.is_file()]
+    assert not no_files.exists()
 
 
 def emps_downloader(broken: bool = False):
@@ -106,13 +106,20 @@ def test_a_package_download_that_breaks_off_leaves_nothing(no_files, monkeypatch
     monkeypatch.setattr("nonlinear_benchmarks.EMPS", emps_downloader(broken=True))
     with pytest.raises(UnusableInput, match="line went dead"):
         fetch("emps")
-    assert not [file for file in no_files.rglob("*") if file.is_file()]
+    assert not no_files.exists()
 
 
 def test_a_cache_that_cannot_be_written_is_one_sentence(no_files):
     no_files.write_text("a file where the cache should be")
     with pytest.raises(UnusableInput, match="could not be downloaded"):
         fetch("daisy_ballbeam")
+
+
+def test_a_set_without_a_licence_is_not_downloaded_and_says_where_it_is(no_files):
+    with pytest.raises(UnusableInput, match=r"state no licence, so clone .*sysid yourself and set SIMGAP_DATA"):
+        fetch("sts3215")
+    assert "simgap data fetch" not in available()["sts3215"]
+    assert not no_files.exists()
 
 
 def test_a_simulated_set_needs_no_download(no_files):

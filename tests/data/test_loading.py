@@ -44,9 +44,25 @@ def test_a_csv_file_is_named_after_itself_unless_told_otherwise(frame, tmp_path)
     assert load(tmp_path / "log.csv", ["u"], ["y"], name="rig").name == "rig"
 
 
-def test_a_file_name_that_cannot_name_a_data_set_is_refused(frame, tmp_path, refused):
-    frame.to_csv(tmp_path / "(1).csv", index=False)
-    assert "'(1)' is not usable" in refused(tmp_path / "(1).csv", ["u"], ["y"])
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("log (1)", "log 1"), ("_log", "log"), ("Ölstand", "Ölstand"), ("a+b", "a b"), ("测量", "测量"), ("()", "record")],
+)
+def test_any_file_name_names_a_data_set(frame, tmp_path, file, name):
+    frame.to_csv(tmp_path / f"{file}.csv", index=False)
+    assert load(tmp_path / f"{file}.csv", ["u"], ["y"]).name == name
+
+
+def test_a_long_file_name_is_cut(frame, tmp_path):
+    frame.to_csv(tmp_path / f"{'a' * 100}.csv", index=False)
+    assert load(tmp_path / f"{'a' * 100}.csv", ["u"], ["y"]).name == "a" * 80
+
+
+def test_an_output_that_never_moves_is_refused(frame, tmp_path, refused):
+    frame.assign(y=1.5).to_csv(tmp_path / "log.csv", index=False)
+    assert "output column 'y' is 1.5 in all 30 rows of the training split" in refused(
+        tmp_path / "log.csv", ["u"], ["y"]
+    )
 
 
 def test_changing_the_frame_afterwards_does_not_change_the_data_set(frame):

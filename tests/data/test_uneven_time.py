@@ -98,6 +98,37 @@ def test_samples_on_the_grid_are_kept_and_not_counted_as_interpolated():
     assert "198 rows resampled to 200 samples every 0.1 s, 2 interpolated" in str(reading)
 
 
+def test_what_a_coarser_grid_cannot_show_is_averaged_out_and_does_not_come_back_as_a_slow_swing():
+    t = np.arange(60_000) * 1e-3
+    log = frame(t).assign(y=np.sin(2 * np.pi * 49.9 * t))  # seen every 0.1 s it would swing at 0.1 Hz
+    reading = read(log, ["u"], ["y"], resample=0.1)
+    assert "60000 rows resampled to 600 samples every 0.1 s, each the mean over 0.1 s" in str(reading)
+    assert max(np.abs(part.y).max() for part in experiments(reading.dataset)) < 0.03
+    u = np.concatenate([part.u[:, 0] for part in experiments(reading.dataset)])
+    np.testing.assert_allclose(u, np.sin(0.1 * np.arange(600)), atol=1e-3)
+
+
+def test_the_mean_over_a_coarser_step_leaves_a_ramp_as_it_is_to_both_ends():
+    reading = read(frame(UNEVEN), ["u"], ["y"], resample=0.5)
+    y = np.concatenate([part.y[:, 0] for part in experiments(reading.dataset)])
+    np.testing.assert_allclose(np.diff(y), 1.5)
+
+
+def test_a_clock_of_whole_milliseconds_may_be_off_by_ten_percent_anywhere():
+    t = np.arange(1000) * 0.01
+    for late in (1, 20, 777):
+        clock = t.copy()
+        clock[late] += 1e-3
+        assert load(frame(clock), ["u"], ["y"]).training.dt == 0.01
+    assert abs(load(frame(np.round(np.arange(1000) * 0.0097, 3)), ["u"], ["y"]).training.dt - 0.0097) < 1e-6
+
+
+def test_times_of_day_go_on_over_midnight():
+    seconds = (86_390 + np.arange(30)) % 86_400
+    log = frame(np.arange(30)).assign(t=[f"{s // 3600:02d}:{s // 60 % 60:02d}:{s % 60:02d}" for s in seconds])
+    assert load(log, ["u"], ["y"]).training.dt == 1.0
+
+
 def test_nothing_is_interpolated_across_a_wide_gap(refused):
     t = np.concatenate([UNEVEN, 20 + UNEVEN[-1] + UNEVEN])
     sentence = refused(frame(t), ["u"], ["y"], resample=0.1)
