@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import excerpt
-from simgap.baselines.estimation.equation_error import check_length
+from simgap.baselines.estimation.equation_error import check_found, check_length
 from simgap.baselines.estimation.kernel_regression import KernelNarx, Regression, scaled, stacked
 from simgap.baselines.estimation.narx_error import scales
 from simgap.baselines.estimation.orders import check_limits
@@ -82,8 +82,9 @@ class KernelNarxModel:
             found = ((error(solved(regression, structure, ridge)), ridge) for ridge in RIDGES)
             return *min(found), structure
 
-        chosen = _search(best_ridge, [s for s in self._structures() if s.lags < longest // 4], self.max_centres)
-        _, ridge, structure = chosen
+        structures = [s for s in self._structures() if s.lags < longest // 4]
+        check_found(structures, data)
+        _, ridge, structure = _search(best_ridge, structures, self.max_centres)
         self._chosen = solved(_regression(train, structure, self.max_centres), structure, ridge)
         everything = scaled([*data.train, *data.valid], means, sizes)
         self.model = solved(_regression(everything, structure, self.max_centres), structure, ridge)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import excerpt
-from simgap.baselines.estimation.equation_error import check_length
+from simgap.baselines.estimation.equation_error import check_found, check_length
 from simgap.baselines.estimation.forward_selection import forward_selection
 from simgap.baselines.estimation.monomials import monomials, regressors, values
 from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
@@ -56,6 +56,7 @@ class Narx:
             return np.inf if NarxError.of(model, records, data.n_init).strays() else error(model)
 
         found = sorted((min(((error(m), m) for m in of), key=_first) for of in self._rankings(data)), key=_first)
+        check_found(found, data)
         safe = [pair for pair in found if np.isfinite(safe_error(pair[1]))] or found
         finished = [refined(model, records, data.n_init, STEPS) for _, model in safe[:REFINED]]
         best = min([safe[0], *((safe_error(model), model) for model in finished)], key=_first)

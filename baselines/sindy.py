@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.baselines.estimation.batches import excerpt
-from simgap.baselines.estimation.equation_error import check_length
+from simgap.baselines.estimation.equation_error import check_found, check_length
 from simgap.baselines.estimation.monomials import maps, monomials, regressors, values
 from simgap.baselines.estimation.narx_error import NarxError, PolynomialNarx, refined, refined_safely, scales
 from simgap.baselines.estimation.orders import check_limits
@@ -61,6 +61,7 @@ class Sindy:
             return NarxError.of(model, records, data.n_init).strays()
 
         found = sorted(((error(m), len(m.theta), k, m) for k, m in enumerate(self._sparse(data, records))))
+        check_found(found, data)
         safe = list(islice((model for *_, model in found if not strays(model)), REFINED))
         finished = [refined(model, records, data.n_init, STEPS) for model in safe]
         trusted = safe[:1] + [model for model in finished if not strays(model)]

@@ -148,7 +148,7 @@ class Offer:
 
     output: str
     formula: str
-    explained: float  # share of the squared error of the force, held out
+    explained: float  # share of what the model leaves of the squared error of the output, in training
     unit: str
 
 

@@ -23,14 +23,13 @@ from simgap.reports.skill import skill_table
 from simgap.reports.tables import Table, dataset_table, overview, tidy
 from simgap.results import store
 
-NO_SUITES = (recovery.FOLDER, "artefacts", "site", "figures")  # what else stands in a folder of results
 FEW = 2  # data sets, whose figures are shown after a run
 
 HOW_TO_READ = (
     "Every model is simulated over the whole test record from its first measured outputs alone (free run). "
     "Fit is 100 (1 - RMSE / standard deviation), pooled over test experiments and outputs; the best of a "
     "column is bold. 'k ahead' is the RMSE of a forecast k samples after the last measured output it uses. "
-    "With several seeds: median (range)."
+    "Where the seeds of a model differ: median (range); those of a deterministic model tell rounding errors apart."
 )
 
 
@@ -112,8 +111,7 @@ def read_suites(folder: Path) -> dict[str, list[Result]]:
     """
     if not folder.is_dir():
         raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one")
-    inside = sorted(path for path in folder.iterdir() if path.is_dir() and path.name not in NO_SUITES)
-    folders = [folder, *inside]
+    folders = [folder, *store.suites_in(folder)]
     suites = {path.resolve().name: rows for path in folders if (rows := store.read(path))}
     if not suites and not recovery.read(folder):
         raise UnusableInput(f"{folder} holds no results; `simgap run` makes them")

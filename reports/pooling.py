@@ -25,7 +25,7 @@ class Spread:
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
         """Sum up at least one value; infinities are values like others."""
-        return cls(statistics.median_low(values), min(values), max(values))
+        return cls(statistics.median(values), min(values), max(values))
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ def skill_table(results: Sequence[Result]) -> Table | None:
         skill = 1 - geometric mean over data sets of RMSE / RMSE of ARX,   win rate: share of the others' errors above
 
     with the median RMSE of the seeds, pooled over outputs in units of their spread, ratios within 1/100 and 100, and
-    95 % intervals by bootstrap over the data sets (Shchur et al., fev-bench, 2025; Efron and Tibshirani 1993). On a
-    data set where a model failed, its error is infinite; where it was not run, it is not counted.
+    95 % intervals by bootstrap over the data sets (Shchur et al., fev-bench, 2025; Efron and Tibshirani 1993). The
+    error of a seed that failed is infinite; a data set on which a model was not run is not counted.
     """
     found: dict[str, list[Standing]] = {}
     for standing in standings(results):
@@ -56,9 +56,10 @@ def skill_table(results: Sequence[Result]) -> Table | None:
     rows.sort(key=lambda row: -(row[1].value or 0.0))
     notes = [
         "Skill: 100 (1 - geometric mean over data sets of the model's free-run error divided by that of ARX), a ratio "
-        "within 1/100 and 100. Win rate: on how many percent of data sets and other models its error is the smaller "
-        "one. In brackets: 95 %, by bootstrap over data sets; few of them make it wide. Parameters: median; "
-        "seconds of fitting: of all data sets together, one seed."
+        "within 1/100 and 100. Win rate: on how many percent of data sets and other rows of this table, networks on "
+        "windows among them, its error is the smaller one. In brackets: 95 %, by bootstrap over data sets; few of them "
+        "make it wide. Parameters: median; seconds of fitting: of all data sets together, one seed, the median of "
+        "seeds that ran on machines of different speed."
     ]
     columns = ["model", "skill %", "win rate %", "data sets", "parameters", "fit s"]
     return Table("Skill over all data sets", columns, rows, notes)

@@ -18,6 +18,8 @@ from simgap.wording import number
 # More test experiments than these are pooled into one column.
 COLUMNS_PER_EXPERIMENT = 4
 HORIZONS = ("1", "10", "50")
+LOWEST_FIT = -100.0  # percent, as far as a fit counts in the order of the models
+ORDER = "Models that ran on more data sets come first; of those that ran on as many, the one with the higher mean fit."
 FIGURES = ("rmse", "nrmse", "fit_percent", "r2", "mse", "mae", "std", "n_scored")
 
 
@@ -82,11 +84,18 @@ def overview(results: Sequence[Result], ratios: Ratios | None = None) -> Table:
             for name in datasets
         ]
         rows.append([Cell(model), *cells])
-    rows.sort(key=lambda row: sum(_or_worst(cell.value) for cell in row[1:]), reverse=True)
+    rows.sort(key=lambda row: _by_fit([cell.value for cell in row[1:]]), reverse=True)
     for column in range(1, len(datasets) + 1):
         _mark_best(rows, column, max)
+    order = [ORDER] if len(datasets) > 1 else []
     how_made = [HOW_IT_IS_MADE] if any(ratios.values()) else []
-    return Table("Free-run fit in percent", ["model", *datasets], rows, notes.texts + how_made)
+    return Table("Free-run fit in percent", ["model", *datasets], rows, notes.texts + order + how_made)
+
+
+def _by_fit(fits: Sequence[float | None]) -> tuple[int, float]:
+    """Count the data sets of a model, and average its fits; one that diverges must not decide alone."""
+    known = [max(fit, LOWEST_FIT) for fit in fits if fit is not None]
+    return len(known), sum(known) / max(len(known), 1)
 
 
 def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, ErrorRatio] | None = None) -> Table:
@@ -100,6 +109,7 @@ def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, 
     horizons = _horizons(rows_of)
     notes = Notes()
     found.sort(key=lambda standing: _or_worst(_median(standing.fit_percent())), reverse=True)
+    several = len({row.seed for row in rows_of}) > 1
     rows = []
     for standing in found:
         errors = [
@@ -108,15 +118,15 @@ def dataset_table(results: Sequence[Result], dataset: str, ratios: Mapping[str, 
         ahead = [_ahead(standing, output, horizons) for output in units if horizons]
         size, seconds = standing.n_params(), standing.seconds()
         rows.append([
-            Cell(standing.model), Cell(status_of(standing) + notes.of(standing)),
+            Cell(standing.model), Cell(status_of(standing) + notes.of(standing)), *_seeds_cell(standing, several),
             *errors, *_fit_cells(standing, ratios), *ahead,
             Cell("" if size is None else str(size)), Cell("" if seconds is None else number(seconds, 2)),
         ])  # fmt: skip
-    n_errors = len(groups) * len(units)
-    for column in range(2, n_errors + 2):
+    columns = _columns(units, groups, horizons, bool(ratios), several)
+    first, fit = columns.index("status") + 1 + several, columns.index("fit %")
+    for column in range(first, fit):
         _mark_best(rows, column, min)
-    _mark_best(rows, n_errors + 2, max)
-    columns = _columns(units, groups, horizons, bool(ratios))
+    _mark_best(rows, fit, max)
     how_to_read = [HOW_TO_READ] if ratios else []
     return Table(dataset, columns, rows, [*notes.texts, *how_to_read, *warnings_of(rows_of)])
 
@@ -134,9 +144,16 @@ def experiment_groups(rows: Sequence[Result]) -> list[list[str]]:
 
 def warnings_of(rows: Sequence[Result]) -> list[str]:
     """Say what is wrong with rows of one data set in one table."""
+    said = []
     if len({row.provenance.get("data_sha256") for row in rows}) > 1:
-        return ["These rows come from different versions of the data set; run the suite again."]
-    return []
+        said.append("These rows come from different versions of the data set; run the suite again.")
+    mixed = [
+        standing.model for standing in standings(rows)
+        if len({row.provenance.get("model_sha256") for row in standing.rows}) > 1
+    ]  # fmt: skip
+    if mixed:
+        said.append(f"The seeds of {', '.join(mixed)} come from different versions of the code.")
+    return said
 
 
 class Notes:
@@ -188,6 +205,10 @@ def _fit_cells(standing: Standing, ratios: Mapping[str, ErrorRatio] | None) -> l
     return [replace(fit, second=_undecided(ratios, standing.model)), ratio]
 
 
+def _seeds_cell(standing: Standing, several: bool) -> list[Cell]:
+    return [Cell(str(len({row.seed for row in standing.rows})))] if several else []
+
+
 def _ahead(standing: Standing, output: str, horizons: Sequence[str]) -> Cell:
     medians = [_median(standing.rmse_at(output, horizon)) for horizon in horizons]
     if medians == [None] * len(medians):
@@ -220,9 +241,9 @@ def _horizons(rows: Sequence[Result]) -> list[str]:
 
 
 def _columns(
-    units: Mapping[str, str], groups: Sequence[Sequence[str]], horizons: Sequence[str], compared: bool
+    units: Mapping[str, str], groups: Sequence[Sequence[str]], horizons: Sequence[str], compared: bool, several: bool
 ) -> list[str]:
-    columns = ["model", "status"]
+    columns = ["model", "status", "seeds"] if several else ["model", "status"]
     for group in groups:
         columns += [_heading(output, unit, group, len(groups)) for output, unit in units.items()]
     columns += ["fit %", "error / best"] if compared else ["fit %"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from simgap.baselines.estimation.gram import Gram
 from simgap.baselines.estimation.least_squares import solve
 from simgap.baselines.estimation.orders import Orders
 from simgap.baselines.estimation.polynomial import Polynomial
-from simgap.records import UnusableInput
+from simgap.records import TrainingSet, UnusableInput
 
 
 def estimate_arx(gram: Gram, orders: Orders, constant: bool = True) -> LinearFit:
@@ -70,6 +71,15 @@ def check_length(rows: int, parameters: int, lags: int) -> None:
         raise TooFewSamples(
             f"too few samples for the model's order: {parameters} coefficients from {rows} equations "
             f"(each experiment gives its length less {lags}); lower the order or record more"
+        )
+
+
+def check_found(found: Sequence[Any], data: TrainingSet) -> None:
+    """Raise TooFewSamples if no structure could be estimated."""
+    if not found:
+        longest = max(map(len, data.train))
+        raise TooFewSamples(
+            f"too few samples for any structure: the longest training experiment has {longest}; record more"
         )
 
 

@@ -68,10 +68,14 @@ class LinearFit:
         """How many coefficients were estimated."""
         return sum(len(row.values) for row in self.rows)
 
-    def criterion(self, penalty: float) -> float:
-        """Compute sum_i N log(V_i) + penalty * p: AIC for penalty 2, BIC for log N (Ljung 1999, section 16.4)."""
+    def criterion(self, penalty: float, samples: int) -> float:
+        """Compute sum_i N log(V_i) + penalty * p: AIC for penalty 2, BIC for log N (Ljung 1999, section 16.4).
+
+        N is the same for all that are compared, though a higher order leaves fewer samples to estimate from: else the
+        unit of the output would decide.
+        """
         variances = [row.variance * max(1 - len(row.values) / self.samples, 1e-9) for row in self.rows]
-        return float(self.samples * np.sum(np.log(np.maximum(variances, 1e-300)))) + penalty * self.n_params
+        return float(samples * np.sum(np.log(np.maximum(variances, 1e-300)))) + penalty * self.n_params
 
     def complaints(self) -> list[str]:
         """List why the coefficients or the free run may be useless: what to know before trusting the model."""

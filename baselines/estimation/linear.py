@@ -156,8 +156,9 @@ class LinearModel(ABC):
         if by_simulation:
             chosen = simplest_of_the_best(fits, train + valid if self.by_prediction else valid, data.n_init)
         else:
-            penalty = 2.0 if self.select == "aic" else float(np.log(fits[0].samples))
-            chosen = min(fits, key=lambda fit: fit.criterion(penalty))
+            samples = min(fit.samples for fit in fits)
+            penalty = 2.0 if self.select == "aic" else float(np.log(samples))
+            chosen = min(fits, key=lambda fit: fit.criterion(penalty, samples))
         return chosen.orders, chosen
 
     def _fits(self, experiments: Sequence[Experiment], n_init: int, candidates: list[Orders]) -> list[LinearFit]:

@@ -28,7 +28,7 @@ from simgap.records import Dataset
 Runs = Sequence[np.ndarray]  # [N, ny] of each experiment
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of a simulation that grows without bound
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # of a simulation that grows without bound
 def budgets(
     promised: Promise | None, plain: GreyBoxModel, dataset: Dataset, before: Runs, seed: int
 ) -> tuple[Budget, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simgap.records import Dataset
+from simgap.wording import amount
 
 SHORT = 200  # training samples; with fewer, weak effects do not stand out from noise
 
@@ -28,8 +29,8 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
             times = int(np.sum(y == limit))
             if times > max(5, 0.005 * len(y)) and np.ptp(y) > 0:
                 sentences.append(
-                    f"{channel.name} stands at its {word} value, {limit:.4g} {channel.unit}".rstrip()
-                    + f", in {times} samples: the machine or the sensor may have a limit there."
+                    f"{channel.name} stands at its {word} value, {amount(limit, channel.unit, 4)}, in {times} samples: "
+                    "the machine or the sensor may have a limit there."
                 )
         values = np.unique(y)
         if 3 <= len(values) < 0.05 * len(y) and len(values) < 500:

@@ -97,14 +97,17 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
     stage("Weighing the evidence")
     evidence = [Evidence(one, dataset.channels) for one in identified]
     doubt = (controller,) if controller else _doubt(evidence, dataset.channels)
-    left, offers = _left(evidence, dataset)
+    shares, offers = _left(evidence, dataset)
     trusted = [plant for plant in map(promises.rests_on, evidence) if plant]
     endless = len(trusted) < len(evidence)
     found = any(plant.found for plant in trusted)
-    explained = min(plant.explained for plant in evidence) if found and not endless else 0.0
     verdict: Verdict = "nothing_found"
     promised = None
-    if not doubt and (endless or (left > LEFT_OF_PLAIN and left > LEFT_OF_EXPLAINED * explained)):
+    more = any(
+        left > max(LEFT_OF_PLAIN, LEFT_OF_EXPLAINED * plant.explained)
+        for left, plant in zip(shares, evidence, strict=True)
+    )
+    if not doubt and (endless or more):
         verdict = "unexplained"
     elif found and not doubt:
         stage("Measuring the gain on the test experiments")
@@ -135,7 +138,7 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
             *unsaid_kinds.taken_for(identified, dataset.channels),
             *checks.limitations(dataset),
         ),
-        left=left,
+        left=max(shares),
         offers=offers if verdict == "unexplained" else (),
         traces=_traces(dataset, before, promised.after if promised else before),
         seed=seed,
@@ -174,17 +177,17 @@ def _linear(identified: Sequence[Identified], dataset: Dataset) -> dict[str, Any
     return _plain(model, dataset, [gains.free_run(model, x, dataset.n_init) for x in dataset.test])
 
 
-def _left(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[float, tuple[Offer, ...]]:
-    """Find the largest share of the plain model's squared error that could still be predicted, and formulas for it."""
-    left, offers = 0.0, []
+def _left(evidence: Sequence[Evidence], dataset: Dataset) -> tuple[list[float], tuple[Offer, ...]]:
+    """Find the share of each plain model's squared error that could still be predicted, and formulas for it."""
+    shares, offers = [], []
     for plant in evidence:
         selection = plant.selection
         rest = look_for_more(selection.trial.estimate, selection.baseline.train)
-        share = rest.share * (1 - plant.explained)
-        left = max(left, share)
-        if share > LEFT_OF_PLAIN:
-            offers.append(formula(rest, dataset.channels.outputs[selection.baseline.outputs[0]]))
-    return left, tuple(offers)
+        shares.append(rest.share * (1 - plant.explained))
+        channel = dataset.channels.outputs[selection.baseline.outputs[0]]
+        if shares[-1] > LEFT_OF_PLAIN and (offer := formula(rest, channel)):
+            offers.append(offer)
+    return shares, tuple(offers)
 
 
 def _traces(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray]) -> tuple[Trace, ...]:

@@ -26,18 +26,22 @@ def shows_controller(experiments: Sequence[Experiment], channels: Channels) -> s
 
     An input that is held between samples cannot move the output within the same sample; a controller reads the one and
     sets the other there. So r(0)^2 is large, and r(-1) is larger than r(1) (Box, Jenkins and Reinsel 1994, ch. 11).
+    An imposed motion and the force that it takes are no such pair: a spring answers at once.
     """
     for i, u in enumerate(channels.inputs):
         for j, y in enumerate(channels.outputs):
+            if u.kind in ("position", "velocity") and y.kind == "other":
+                continue
             changes = [(np.diff(x.u[:, i]), np.diff(x.y[:, j])) for x in experiments if len(x) > 3]
             earlier, same, later = (_correlation(changes, lag) for lag in (-1, 0, 1))
             samples = sum(len(of_u) for of_u, _ in changes)
             leads = abs(earlier) - abs(later) > CERTAIN / np.sqrt(max(samples, 1))
             if same**2 > (TOGETHER if leads else ALIKE):
+                imposed = f" If {u.name} is an imposed motion and {y.name} a force, give their units in the headings."
                 return (
                     f"{u.name} answers {y.name} in the same sample (their changes correlate {same:.2f}): the record "
                     f"shows the controller, and a model of it need not be the plant. Move {u.name} by hand or add a "
-                    "test signal to it, and record again."
+                    f"test signal to it, and record again.{'' if leads or u.unit else imposed}"
                 )
     return None
 

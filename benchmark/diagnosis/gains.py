@@ -27,12 +27,15 @@ def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[
     return model.simulate(experiment.u[None], experiment.y[None, :n_init])[0]
 
 
-def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray]) -> Gain:
+def measure(
+    dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.ndarray], own: Sequence[int] = ()
+) -> Gain:
     """Compare the errors of two simulations of the test experiments, before and after the causes were added.
 
         share = 1 - |e_after| / |e_before|,   over all outputs, each divided by its standard deviation
 
-    with the 95 % interval of `share_with_interval`.
+    with the 95 % interval of `share_with_interval`. `own` numbers of each output were fitted to each test experiment
+    itself, which takes own / (N / tau) of N errors of memory tau even where nothing is there; that is put back.
     """
     n = dataset.n_init
     y = np.concatenate([x.y[n:] for x in dataset.test])  # [N, ny]
@@ -43,14 +46,25 @@ def measure(dataset: Dataset, before: Sequence[np.ndarray], after: Sequence[np.n
     rmse = [np.sqrt(np.mean(square, axis=0)) for square in squares]  # in units of scale
     beats_mean = bool(np.any(rmse[1] < 1))
     rmse = [np.where(error < GROWN, error * scale, np.inf) for error in rmse]
-    loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
     lengths = np.array([len(x) - n for x in dataset.test if len(x) > n])
+    for j, count in enumerate(own):
+        squares[1][:, j] *= _price(errors[1][:, j], lengths, count)
+    loss_before, loss_after = (np.sum(square + SMALLEST_ERROR**2, axis=1) for square in squares)
     memory = max(correlation_time(signal, lengths, 0)[0] for error in errors for signal in error.T)
     shares = share_with_interval(loss_before, loss_after, lengths, memory)
     share, low, high = (value if value > -GROWN else -np.inf for value in shares)
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
     return Gain(rmse_before, rmse_after, share, low, high, beats_mean)
+
+
+def _price(error: Float[np.ndarray, " N"], lengths: np.ndarray, own: int) -> float:
+    """What squared errors grow by when as many numbers of each experiment are not fitted to them."""
+    if not own:
+        return 1.0
+    fitted = own * len(lengths)
+    independent = len(error) / correlation_time(error, lengths, fitted)[0]
+    return independent / max(independent - fitted, 1e-3)
 
 
 def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[str, dict[str, float]]:

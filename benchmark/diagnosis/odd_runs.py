@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from simgap.records import Dataset, Experiment
+from simgap.wording import amount
 
 FAR = 8.0  # times the error of the usual run
 FEWEST = 8  # runs that tell what is usual
@@ -24,7 +25,7 @@ def odd_runs(model: Any, dataset: Dataset) -> tuple[str, ...]:
     usual, unit = float(np.median(errors)), dataset.channels.outputs[0].unit
     odd = [i for i in np.argsort(-errors) if errors[i] > FAR * usual][:MOST_NAMED]
     return tuple(
-        f"The run {runs[i].name} is explained by no model: its mean absolute error is {errors[i]:.2g} {unit}, "
-        f"{errors[i] / usual:.0f} times the usual one. The machine may have stuck or slipped there."
+        f"The run {runs[i].name} is explained by no model: its mean absolute error is "
+        f"{amount(float(errors[i]), unit, 2)}, {errors[i] / usual:.0f} times the usual one. The machine may have stuck or slipped there."
         for i in odd
     )

@@ -63,7 +63,7 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
         kept = [only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
         model = GreyBoxModel([plant.identified.plant for plant in kept])
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
-        gain = gains.measure(dataset, before, after)
+        gain = gains.measure(dataset, before, after, model.own_numbers)
         suspected = suspected or Promise((), found, (), model, after, gain)
         if gain.shown:
             causes = found if count == len(listed) else _causes(kept, profiles)

@@ -38,7 +38,8 @@ def judge(answer: Diagnosis, dataset: Dataset, simulated: Dataset, seed: int, vi
     trusted = found.verdict != "unexplained" and not found.doubts
     sides = [SideBySide.of(plant, dataset, simulated, seed) for plant in answer.model.plants] if trusted else []
     causes = _causes(found, sides, dataset)
-    gain = gains.measure(dataset, before, after if trusted else before)
+    own = answer.model.own_numbers if trusted else ()
+    gain = gains.measure(dataset, before, after if trusted else before, own)
     verdict: Verdict = found.verdict
     if trusted:
         verdict = "named" if causes else "nothing_found"
@@ -79,7 +80,8 @@ def _confirmed(
         return True
     fitted = [side.corrected([term for _, term in _terms_of(causes, side, dataset)]) for side in sides]
     model = GreyBoxModel(fitted)
-    return gains.measure(dataset, before, [model.simulate_anew(x, dataset.n_init) for x in dataset.test]).low > 0
+    after = [model.simulate_anew(x, dataset.n_init) for x in dataset.test]
+    return gains.measure(dataset, before, after, model.own_numbers).low > 0
 
 
 def _with_kinds(channels: Channels, found: Findings) -> Channels:

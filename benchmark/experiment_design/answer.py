@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -65,8 +66,9 @@ class NextRecord:
         names = [channel.name for channel in self.channels.inputs]
         time = "t" if "t" not in names else "time"
         t = self.limits.dt * np.arange(len(self.design.u))
-        rows = np.column_stack((t, self.design.u))
-        np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join([time, *names]), comments="")
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerow([time, *names])
+            np.savetxt(file, np.column_stack((t, self.design.u)), fmt="%.9g", delimiter=",")
 
     def to_json(self) -> dict[str, Any]:
         """Return the same as JSON."""

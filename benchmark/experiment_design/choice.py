@@ -24,6 +24,7 @@ from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquat
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.records import Dataset, Experiment, UnusableInput
+from simgap.wording import percent
 
 SHOWN = 5
 
@@ -57,10 +58,10 @@ class Choice:
         model = f"the linear model with {', '.join(self.effects)}" if self.effects else "the plain linear model"
         told = (
             f"{self.dataset}: Take {self.best} next. The numbers of {model} are not certain yet, so it would err on "
-            f"the candidates; a fit to this record too leaves {_share(self.left[0])} of that squared error."
+            f"the candidates; a fit to this record too leaves {percent(self.left[0])} of that squared error."
         )
         width = max(map(len, self.names[:SHOWN]))
-        rows = [f"  {name:{width}}  {_share(left):>8}" for name, left in zip(self.names, self.left, strict=True)]
+        rows = [f"  {name:{width}}  {percent(left):>8}" for name, left in zip(self.names, self.left, strict=True)]
         title = "Squared error that is left after a fit to each, too"
         parts = [textwrap.fill(told, 100), "\n".join([title, *rows[:SHOWN]])]
         if self.taken:
@@ -70,10 +71,6 @@ class Choice:
             "What the model lacks is not counted: an effect that no record at hand shows has no number yet. Diagnose "
             "again with the new record before the next choice.", 100))  # fmt: skip
         return "\n\n".join(parts)
-
-
-def _share(left: float) -> str:
-    return f"{100 * left:.2g} %"
 
 
 def choose_record(

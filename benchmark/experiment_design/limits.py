@@ -12,6 +12,7 @@ from jaxtyping import Float
 from simgap.records import Channel, Dataset, Experiment, UnusableInput
 
 LONGEST = 2000  # samples of a record that nobody asked to be longer
+MOST = 100_000  # samples of a record that somebody asked for
 Range = tuple[float, float]
 
 
@@ -73,6 +74,8 @@ def limits_of(
     u, y = (np.concatenate([getattr(x, name) for x in experiments]) for name in ("u", "y"))
     fastest = np.max([np.max(np.abs(np.diff(x.u, axis=0)), axis=0, initial=0.0) for x in experiments], axis=0)
     low, high, rates = u.min(axis=0), u.max(axis=0), fastest / dataset.training.dt
+    if not moved:
+        raise UnusableInput(f"{dataset.name}: no input moves within a record, so there is nothing to design")
     for i, (first, last) in _by_channel("input_range", input_range, inputs, moved).items():
         low[i], high[i] = _ordered("input_range", first, last)
     for i, value in _by_channel("rate", rate, inputs, moved).items():
@@ -89,6 +92,8 @@ def limits_of(
     if not dt * 2 * dataset.n_init <= wanted < np.inf:
         least = 2 * dataset.n_init
         raise UnusableInput(f"seconds {wanted:g}: a record needs {least} samples, that is {least * dt:g} s, or more")
+    if wanted > MOST * dt:
+        raise UnusableInput(f"seconds {wanted:g}: a record may have {MOST} samples at most, that is {MOST * dt:g} s")
     held = np.unique(np.stack([np.where(np.isin(range(u.shape[1]), moved), 0.0, x.u.max(axis=0)) for x in experiments]),
                      axis=0)  # fmt: skip
     return Limits(low, high, rates, wanted, travel_low, travel_high, dt, moved, held)
@@ -115,6 +120,8 @@ def _by_channel(option: str, given: Any, channels: Sequence[Channel], usual: Seq
     for name in given:
         if name not in names:
             raise UnusableInput(f"{option}: there is no column {name!r}; there are {', '.join(names)}")
+        if names.index(name) not in usual:
+            raise UnusableInput(f"{option}: {name!r} does not move within a record, and stays as it is in a new one")
     return {names.index(name): value for name, value in given.items()}
 
 

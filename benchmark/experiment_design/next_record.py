@@ -103,9 +103,9 @@ def _wider(questions: Sequence[Question], limits: Limits, design: Design | None,
 
 def _untold(identified: Sequence[Identified], channels: Channels) -> str:
     """Say what no record of these columns can tell."""
-    plant = identified[0].plant.estimate.plant
+    plants = [one.plant.estimate.plant for one in identified]
     known = channels.plant
-    moves = plant.kind in ("position", "velocity") and not plant.imposed
+    moves = any(plant.kind in ("position", "velocity") and not plant.imposed for plant in plants)
     constants = (known.mass, known.inertia) if known is not None else ()
     if not moves or any(constant is not None and (constant.certain or constant.column) for constant in constants):
         return ""

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from simgap.experiment_design.limits import Limits
 from simgap.experiment_design.rivals import Question
-from simgap.experiment_design.separation import refitted, separations, simulate_likely
+from simgap.experiment_design.separation import chunks, refitted, separations, simulate_likely
 from simgap.experiment_design.signals import Shape, grid, slowed
 from simgap.greybox.evidence import CONFOUNDED
 
@@ -139,13 +139,18 @@ def _reach(
     questions: Sequence[Question], u: np.ndarray, limits: Limits
 ) -> tuple[Float[np.ndarray, "E ny"], Float[np.ndarray, "E ny"]]:
     """Find the lowest and the highest that any rival expects of each output, as far as its numbers are known."""
-    low, high = np.full((2, len(u), len(limits.travel_low)), np.nan)
+    reached = np.full((2, len(u), len(limits.travel_low)), np.nan)
     for question in questions:
-        runs = np.concatenate([simulate_likely(rival, u, DRAWS) for rival in question.rivals])  # [r, E, T, ny]
-        runs = np.nan_to_num(runs, nan=np.inf)
-        low[:, list(question.outputs)] = runs.min(axis=(0, 2))
-        high[:, list(question.outputs)] = runs.max(axis=(0, 2))
-    return low, high
+        reached[:, :, list(question.outputs)] = np.concatenate(
+            [_reach_of(question, chunk) for chunk in chunks(u)], axis=1
+        )
+    return reached[0], reached[1]
+
+
+def _reach_of(question: Question, u: np.ndarray) -> Float[np.ndarray, "2 E ny"]:
+    runs = [np.nan_to_num(simulate_likely(rival, u, DRAWS), nan=np.inf) for rival in question.rivals]  # [S, E, T, ny]
+    low, high = ([extreme(run, axis=(0, 2)) for run in runs] for extreme in (np.min, np.max))
+    return np.stack((np.min(low, axis=0), np.max(high, axis=0)))
 
 
 def _design(questions: Sequence[Question], limits: Limits, candidate: Candidate) -> Design:

@@ -39,10 +39,11 @@ def separations(question: Question, u: Float[np.ndarray, "E T nu"]) -> Float[np.
     information that the records at hand hold about its numbers: D / 2 is what the log-likelihood of both models will
     differ by more than now (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975, eq. 2.2; its minimum linearised).
     """
-    return np.concatenate([_of_chunk(question, chunk) for chunk in _chunks(u)], axis=2)
+    return np.concatenate([_of_chunk(question, chunk) for chunk in chunks(u)], axis=2)
 
 
-def _chunks(u: np.ndarray) -> Iterator[np.ndarray]:
+def chunks(u: Float[np.ndarray, "E T nu"]) -> Iterator[Float[np.ndarray, "e T nu"]]:
+    """Part many records into as many at a time as memory holds with all that is simulated of them."""
     size = max(1, CHUNK // u.shape[1])
     for first in range(0, len(u), size):
         yield np.ascontiguousarray(u[first : first + size])

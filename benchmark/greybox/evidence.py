@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 
+from simgap.error_views.correlation import correlation_time
 from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
 from simgap.findings import Cause, Profile, Separation, Value
 from simgap.greybox.effects.effect import Effect
@@ -18,6 +20,7 @@ from simgap.greybox.identification import Identified
 from simgap.greybox.intervals import intervals
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.problem import Problem
+from simgap.greybox.samples import Records
 from simgap.greybox.selection import Selection
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, significant
@@ -163,7 +166,7 @@ class Evidence:
         plant, (low, high) = estimate.plant, self._intervals
         parameters = plant.parameters_of(term)
         if term in plant.per_experiment:
-            sizes = np.linalg.norm(estimate.local[:, plant.own_part_of(term)], axis=1)
+            sizes = _sizes_of_own(term, estimate.local[:, plant.own_part_of(term)], self.identified.plant.records)
             spread, smallest, largest = np.sqrt(np.mean(sizes**2)), np.min(sizes), np.max(sizes)
             name = f"{parameters[0].name}, rms over experiments"
             return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
@@ -201,7 +204,7 @@ class Evidence:
         return self.channels.outputs[outputs[term.channel]].name if term.effect.port == "output" else ""
 
     def _profiles(self, term: Term) -> tuple[Profile, ...]:
-        """2 (log L_max - log L) over values of each parameter, everything else fitted anew."""
+        """2 (log L_max - log L) over values of each parameter, everything else fitted anew, of independent errors."""
         fitted, selection = self.identified.plant, self.selection
         estimate, records = fitted.estimate, fitted.records
         if records.samples > ENOUGH:
@@ -211,7 +214,9 @@ class Evidence:
             return ()
         problem = Problem(plant, records, selection.baseline.noise)
         low, high = self._intervals
-        n = records.samples * plant.ny
+        lengths, errors = records.mask.sum(axis=1), np.moveaxis(estimate.errors, 2, 0)
+        memory = max(correlation_time(e[records.mask], lengths, 0)[0] for e in errors)
+        n = records.samples * plant.ny / memory  # independent errors, as the intervals count them
         profiles = []
         for i, parameter in enumerate(plant.parameters_of(term), start=plant.part_of(term).start):
             half = 0.5 * (high[i] - low[i])
@@ -227,6 +232,15 @@ class Evidence:
             values, deviance = zip(*sorted(points), strict=True)
             profiles.append(Profile(parameter.name, parameter.unit, values, deviance))
         return tuple(profiles)
+
+
+def _sizes_of_own(term: Term, own: Float[np.ndarray, "E o"], records: Records) -> Float[np.ndarray, " E"]:
+    """Measure what is estimated anew in every experiment: the rms of a load over each record, else its size."""
+    if term.effect.port != "force":
+        return np.linalg.norm(own, axis=1)
+    middles, measured = records.dt * (np.arange(records.mask.shape[1]) + 0.5), records.mask
+    load = own @ term.effect.shapes(middles, records.duration)  # [E, T]
+    return np.sqrt(np.sum(load**2 * measured, axis=1) / np.maximum(measured.sum(axis=1), 1))
 
 
 def gained(smaller: Trial, larger: Trial) -> float:

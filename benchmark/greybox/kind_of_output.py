@@ -167,7 +167,7 @@ class _Hypotheses:
     @property
     def _never_negative(self) -> bool:
         signals = np.concatenate([np.column_stack((x.y[:, self.output], x.u)) for x in self.data.train])  # [N, 1 + nu]
-        return bool((signals.min(axis=0) > -BELOW_ZERO * signals.std(axis=0)).all())
+        return bool((signals.min(axis=0) >= -BELOW_ZERO * signals.std(axis=0)).all())
 
 
 def _extended(plain: Hypothesis) -> Hypothesis:

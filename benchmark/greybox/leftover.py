@@ -135,8 +135,10 @@ def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jaco
     return best
 
 
-def formula(leftover: Leftover, channel: Channel) -> Offer:
+def formula(leftover: Leftover, channel: Channel) -> Offer | None:
     """Find the shortest formula for the missing force that predicts the error nearly as well as the fullest one.
+
+    None where no force is left in it.
 
     Sequentially thresholded least squares (Brunton, Proctor, Kutz 2016), by pysindy, of the error on what each
     candidate force would do to the output; x, v and the inputs are in units of their spread.
@@ -159,7 +161,8 @@ def formula(leftover: Leftover, channel: Channel) -> Offer:
     share, coefficients = min(
         (trial for trial in tried if trial[0] > best - WORSE), key=lambda trial: np.count_nonzero(trial[1])
     )
-    order = np.argsort(-np.abs(coefficients))
-    largest = np.max(np.abs(coefficients)) or 1.0
+    if not coefficients.any():
+        return None
+    order, largest = np.argsort(-np.abs(coefficients)), np.max(np.abs(coefficients))
     parts = [f"{coefficients[i] / largest:+.2g} {leftover.names[i]}" for i in order if coefficients[i]]
     return Offer(channel.name, "force ~ " + " ".join(parts), max(0.0, share), "relative")

@@ -67,7 +67,7 @@ def spread(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> 
     """Take whole experiments, evenly spread, of those that are not long."""
     if not experiments:
         return []
-    wanted = max(2, samples // max(map(len, experiments)))
+    wanted = max(2, samples * len(experiments) // sum(map(len, experiments)))
     if max(map(len, experiments)) > LONG:
         return excerpts(experiments, samples)
     if len(experiments) <= wanted:

@@ -218,6 +218,15 @@ class GreyBoxModel:
         return sum(plant.log_likelihood() for plant in self.plants)
 
     @property
+    def own_numbers(self) -> tuple[int, ...]:
+        """Numbers that `simulate_anew` fits to an experiment, of each output."""
+        of_output = {
+            output: plant.estimate.plant.n_local - plant.estimate.plant.n_start
+            for plant in self.plants for output in plant.outputs
+        }  # fmt: skip
+        return tuple(of_output[output] for output in sorted(of_output))
+
+    @property
     def n_params(self) -> int:
         """Numbers that a simulation uses."""
         return sum(int(plant.forecasting.free.sum()) for plant in self.plants)

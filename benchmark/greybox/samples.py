@@ -16,7 +16,7 @@ SEARCH_SAMPLES = 5000
 PIECE = 500
 # Of the size of a signal: an error that is smaller is rounding, of a file or of a simulation, and means nothing.
 RESOLUTION = 1e-9
-OFFSET = 1e-3  # the share of a constant reading that counts as its size
+OFFSET = 1e-6  # the share of its largest value that a reading must move by to be no constant; more than rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +103,11 @@ class Records:
     def samples(self) -> int:
         """Number of measured samples of each output."""
         return int(self.mask.sum())
+
+    @property
+    def usual_length(self) -> float:
+        """Geometric mean of the measured samples of the records."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.mask.sum(axis=1), 1)))))
 
 
 def sizes_of(signals: Float[np.ndarray, "N n"]) -> Float[np.ndarray, " n"]:

@@ -17,6 +17,7 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import in_most, on_other_records, squares_of_blocks
 from simgap.greybox.noise import explained_by_past, log_likelihood, schwarz_order
 from simgap.greybox.problem import Problem
+from simgap.greybox.samples import Records
 from simgap.greybox.score_test import STARTS, candidates
 from simgap.greybox.terms import Term
 
@@ -47,6 +48,7 @@ class Trial:
 
     terms: tuple[Term, ...]
     estimate: Estimate
+    records: Records  # of training
     train: float
     valid: float
     k: int  # parameters estimated for all experiments
@@ -68,9 +70,8 @@ class Trial:
     @property
     def score(self) -> float:
         """Log-likelihood of all data less what its parameters cost (Schwarz 1978 for those of all experiments)."""
-        n = self.estimate.errors.shape[0] * self.estimate.errors.shape[1]
-        per_record = math.log(self.estimate.errors.shape[1])
-        return self.train + self.valid - 0.5 * self.k * math.log(n) - 0.5 * (self.k_train + self.k_valid) * per_record
+        of_all, of_one = 0.5 * math.log(self.records.samples), 0.5 * math.log(self.records.usual_length)
+        return self.train + self.valid - self.k * of_all - (self.k_train + self.k_valid) * of_one
 
 
 def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
@@ -80,7 +81,7 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     problem = Problem(plant, valid, baseline.noise)
     on_valid = on_other_records(problem, estimate.theta)
     return Trial(
-        plant.terms, estimate,
+        plant.terms, estimate, baseline.train,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
         int(plant.free.sum()), len(baseline.train.u) * own, len(valid.u) * own,
@@ -165,8 +166,8 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     if larger.k_valid > smaller.k_valid:
         # Estimated anew there, so the gain must pay for that; and so in training, counted in independent samples:
         # a line through what wanders slowly seems certain, but takes little of it (Durlauf and Phillips 1988).
-        price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.mask.shape[1])
-        paid = 0.5 * (larger.k_train - smaller.k_train) * math.log(baseline.train.mask.shape[1])
+        price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.usual_length)
+        paid = 0.5 * (larger.k_train - smaller.k_train) * math.log(baseline.train.usual_length)
         straight = free_run_ratio(baseline, smaller, larger) > paid
         return straight and larger.valid - smaller.valid - price > HELD_OUT
     # One simulation that grows without bound must not outweigh all other blocks.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ class Uncertainty:
     """The covariance of the estimate of theta, from so many degrees of freedom; 0 for what is not estimated."""
 
     covariance: Float[np.ndarray, "p p"]
-    freedom: int
+    freedom: float
 
     def reach(self, level: float = 0.95) -> Float[np.ndarray, " p"]:
         """Return the half width of the interval of each parameter, by Student's t."""
@@ -39,6 +40,8 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     P is the block's share of the projection onto all slopes: where a few samples tell most of a number, the fit has
     made their errors small (Liang and Zeger 1986; Bell and McCaffrey, Survey Methodology 28, 2002, CR2). Where so few
     blocks tell it that their sum is chance, it is smaller than the s^2 H^-1 of white errors, and then that counts.
+    Blocks of unequal records hold unequal numbers of samples: with their shares w there are 1 / sum(w^2) - 1 degrees of
+    freedom (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
     """
     plant, theta = estimate.plant, estimate.theta
     jacobian = Problem(plant, records, noise).jacobian(theta, estimate.local, plant.free)
@@ -55,21 +58,24 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     root, of_own = _inverse_root(h[np.ix_(inside, inside)] / scale / scale[:, None]), _inverse_root(normal.blocks)
     columns = np.einsum("pem,pr->erm", own, root), np.einsum("qem,eqr->erm", jacobian.local, of_own)
     projected = np.concatenate(columns, axis=1)  # P = A' A, A [E, r, M]
-    g = []
-    for at in np.array_split(np.arange(white.shape[1]), max(1, -(-BLOCKS // len(white)))):
+    g, samples = [], []
+    measured = np.repeat(records.mask, plant.ny, axis=1)  # [E, M]
+    for at in np.array_split(np.arange(white.shape[1]), math.ceil(BLOCKS * white.shape[1] / measured.sum())):
         a = projected[:, :, at]
         share, along = np.linalg.eigh(a @ a.swapaxes(1, 2))
         of_block = (along.swapaxes(1, 2) @ (a @ white[:, at, None]))[:, :, 0]
         of_block /= np.sqrt(1 - np.minimum(share, MOST))
         g.append((along @ of_block[:, :, None])[:, : len(root), 0])
+        samples.append(measured[:, at].sum(axis=1))
     moved = np.concatenate(g) @ root / scale  # [blocks, p]
+    share = np.concatenate(samples) / measured.sum()
     freedom = max(1, records.samples * plant.ny - int(inside.sum()) - estimate.local.size)
     of_white = float(np.vdot(white, white)) / freedom * np.sum((root / scale) ** 2, axis=0)
     of_blocks = np.sum(moved**2, axis=0)
     wider = np.sqrt(np.maximum(1.0, of_white / np.where(of_blocks > 0, of_blocks, np.inf)))
     covariance = np.zeros((len(theta), len(theta)))
     covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider)
-    return Uncertainty(covariance, max(2, len(moved) - 1))
+    return Uncertainty(covariance, max(2.0, 1 / np.sum(share**2) - 1))
 
 
 def _inverse_root(h: Float[np.ndarray, "... n n"]) -> Float[np.ndarray, "... n n"]:

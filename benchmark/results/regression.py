@@ -17,11 +17,10 @@ from simgap.results import store
 
 Change = Literal["same", "better", "worse", "missing", "new"]
 
-# Share by which an RMSE may grow: of a model that computes, several times what rounding on another processor moves it,
-# and of one whose numbers depend on the seed; more where its seeds spread more.
+# Share by which an RMSE may grow: of a deterministic model, several times what rounding on another processor moves it,
+# and of a stochastic one; more where its seeds spread more.
 COMPUTED = 1e-5
 STOCHASTIC = 0.05
-SIGMAS = 3.0  # of the seeds of a model that computes, which rounding tells apart
 ALARM = 0.001  # chance of one where nothing but rounding changed
 # Share of the spread of what was measured below which an RMSE is rounding.
 ROUNDING = 1e-9
@@ -68,22 +67,22 @@ class Regression:
 def check(new: str | Path, reference: str | Path = Path("reports") / "results") -> Regression:
     """Compare the results in a folder with those of a reference, suite by suite.
 
-    An RMSE of a model that computes is worse when it exceeds the reference by more than max(3 sigma of its seeds, 1e-5
-    of it); its seeds differ by how rounding falls (`simgap.running.rounding`). One of a model that declares itself
-    stochastic may exceed it by 5 %, or as far as one of two draws exceeds the other once in a thousand,
+    An RMSE is worse when it exceeds the reference by more than one of two draws exceeds the other once in a thousand,
 
         t(0.999; n - 1) sqrt(2) sigma of n seeds,
 
-    because a long training makes another draw of every seed on another processor. What that hides shows on average: the
-    geometric mean of the RMSEs per model and data set, and over all data sets, is worse by more than 5 % and more than
-    the changes of the same seeds scatter (Student's paired t); of a single one, more than two draws may differ. A row
-    of the reference is missing when the new results lack it although they have its seed. Raises UnusableInput.
+    and by more than 1e-5 of it, or 5 % where the model declares itself stochastic. The seeds of a deterministic model
+    differ by how rounding falls (`simgap.running.rounding`), as another processor does; there a long training makes
+    another draw of every seed. What that hides shows on average: the geometric mean of the RMSEs per model and data
+    set, and over all data sets, is worse by more than 5 % and more than the changes of the same seeds scatter
+    (Student's paired t); of a single one, more than two draws may differ. A row of the reference is missing when the
+    new results lack it although they have its seed. Raises UnusableInput.
     """
     new, reference = Path(new), Path(reference)
     for folder in (new, reference):
         if not folder.is_dir():
             raise UnusableInput(f"there is no folder {folder}; `simgap run` makes one with results")
-    suites = [path.name for path in sorted(new.iterdir()) if any(path.glob("*.jsonl"))]
+    suites = [path.name for path in store.suites_in(new)]
     known = [name for name in suites if any((reference / name).glob("*.jsonl"))]
     if not known:
         raise UnusableInput(f"{reference} holds no results of {', '.join(suites) or 'any suite'}; nothing to compare")
@@ -174,10 +173,10 @@ class _Group:
     def _allowed(self, value: float, sigma: float, seeds: int, scale: float) -> float:
         if not math.isfinite(value):
             return 0.0
+        reach = _once_in_a_thousand(seeds) * math.sqrt(2) * sigma if seeds > 1 else 0.0
         if self._stochastic:
-            reach = _once_in_a_thousand(seeds) * math.sqrt(2) * sigma if seeds > 1 else 0.0
             return max(reach, STOCHASTIC * value)
-        return max(SIGMAS * sigma, COMPUTED * value) + ROUNDING * scale
+        return max(reach, COMPUTED * value) + ROUNDING * scale
 
     def _judged(
         self, figure: str, seed: int | None, before: float, after: float, limit: float, row: Result | None

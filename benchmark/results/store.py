@@ -15,6 +15,7 @@ from simgap.results import lines
 from simgap.results.decoding import decode
 
 Key = tuple[str, str, str, str, str, int]
+NO_SUITES = ("recovery", "artefacts", "site", "figures")  # what else stands in a folder of results
 
 
 def key(result: Result) -> Key:
@@ -26,6 +27,12 @@ def key(result: Result) -> Key:
 def path_of(folder: Path, suite: str, model: str) -> Path:
     """The file of one model; a name becomes a file name by replacing what means something in a path."""
     return Path(folder) / file_name(suite) / f"{file_name(model)}.jsonl"
+
+
+def suites_in(folder: Path) -> list[Path]:
+    """The folders of the suites in a folder of results."""
+    inside = sorted(path for path in folder.iterdir() if path.is_dir() and path.name not in NO_SUITES)
+    return [path for path in inside if any(path.glob("*.jsonl"))]
 
 
 def writable(folder: Path) -> Path:

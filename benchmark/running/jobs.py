@@ -25,6 +25,7 @@ from simgap.running.fitting import build, fit_model, model_class, reason, score_
 from simgap.running.rounding import in_other_units
 from simgap.running.source import Code, code_of
 from simgap.running.suites import Entry
+from simgap.running.workers import checkpoints_of
 from simgap.tasks import TASKS
 
 # What takes seconds to import, by the package that a model's code imports. torch._dynamo is what the first step of an
@@ -127,7 +128,8 @@ class Job:
             model = build(self.entry.name, self.entry.params)
             # A model without randomness has seeds too: they show how much rounding moves it.
             training = dataset.training if is_stochastic(model) else in_other_units(dataset.training, self.seed)
-            about = fit_model(model, training, self.about)
+            with checkpoints_of(self.provenance["model_sha256"]):
+                about = fit_model(model, training, self.about)
         except BaseException as error:  # a model may raise anything, and Ctrl-C is not heard in a worker
             return self.failed("error", reason("fit", error))
         try:

@@ -50,7 +50,9 @@ def code_of(classes: Iterable[type]) -> Code:
     for kind in classes:
         file, name = Path(inspect.getfile(kind)), kind.__module__
         added = closure({name: file}, root=None if _is_simgap(name) else file.parents[name.count(".")])
-        code = Code(code.digests | added.digests, code.outside | added.outside)
+        # One file of a user's may hold several models.
+        of_class = {} if _is_simgap(name) else {f"class {kind.__qualname__}": ""}
+        code = Code(code.digests | added.digests | of_class, code.outside | added.outside)
     return code
 
 

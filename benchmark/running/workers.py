@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from simgap.cores import end_with_parent
 
@@ -45,6 +46,23 @@ def prepare_worker(limits: Limits) -> None:
     silence()
     os.environ.update(limits.environment)
     threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+@contextlib.contextmanager
+def checkpoints_of(code: str) -> Iterator[None]:
+    """Let a fit carry on only from what the same code, a digest, has left."""
+    folder = os.environ.get("SIMGAP_CHECKPOINTS")
+    if not folder:
+        yield
+        return
+    own = Path(folder) / code[:12]
+    os.environ["SIMGAP_CHECKPOINTS"] = str(own)
+    try:
+        yield
+    finally:
+        os.environ["SIMGAP_CHECKPOINTS"] = folder
+        with contextlib.suppress(OSError):  # it holds what a killed fit left
+            own.rmdir()
 
 
 def threads_per_worker(workers: int) -> int:

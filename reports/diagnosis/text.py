@@ -46,7 +46,7 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
             paragraphs += _section(title, _absolute(budget, findings), width)
     for offer in findings.offers:
         formula = f"missing force of {offer.output} ({offer.unit}): {offer.formula}"
-        share = f"explains {percent(offer.explained)} of the squared error of the force, held out"
+        share = f"explains {percent(offer.explained)} of the squared error of {offer.output} that is left in training"
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
     if findings.effects:

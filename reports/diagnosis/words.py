@@ -99,6 +99,8 @@ def evidence(cause: Cause) -> str:
         else f", but only of free runs: the one-step errors are no likelier with it (log-likelihood ratio {ratio})"
     )
     explained = f"It explains {percent(cause.evidence)} of the plain model's squared error in training{likely}"
+    if cause.effect == "outliers":
+        return f"{explained}. They are left out of all data."
     return f"{explained}; {held_out}.{remark}"
 
 

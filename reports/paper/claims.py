@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median_low
+from statistics import median
 from typing import Literal
 
 from simgap.records import Result
@@ -99,7 +99,7 @@ def _vote(rule: Rule, seed: Figures) -> bool | None:
 
 def _medians(found: Sequence[Values]) -> Values:
     columns = {column for values in found for column in values}
-    return {column: median_low([values[column] for values in found if column in values]) for column in columns}
+    return {column: median([values[column] for values in found if column in values]) for column in columns}
 
 
 def _printed() -> dict[str, Values]:

@@ -30,3 +30,11 @@ def test_experiments_that_are_few_enough_are_all_taken_whole():
 def test_of_one_long_experiment_its_end_is_taken():
     (taken,) = excerpt(experiments(10000), 8192)
     assert len(taken) == 8192 and taken.u[-1, 0] == 9999.0
+
+
+def test_what_short_experiments_leave_goes_to_the_long_one_wherever_it_stands():
+    for at in (0, 50, 99):
+        lengths = [10] * 99
+        lengths.insert(at, 100_000)
+        taken = excerpt(experiments(*lengths), 8192)
+        assert sum(map(len, taken)) == 8192 and max(map(len, taken)) > 8000

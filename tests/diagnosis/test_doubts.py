@@ -29,6 +29,15 @@ def test_a_controller_is_seen_by_the_sample_that_it_answers_in(seed):
     assert shows_controller([loop(seed, closed=False)], CHANNELS) is None
 
 
+def test_a_spring_that_answers_an_imposed_motion_at_once_is_no_controller():
+    x = np.sin(np.arange(400) / 7)[:, None]
+    run = Experiment("rig", x, 100 * x + 4 * x**3, 0.01)
+    motion, force = Channel("x", "mm", "position"), Channel("F", "N", "other")
+    assert shows_controller([run], Channels((motion,), (force,))) is None
+    said = shows_controller([run], Channels((Channel("x"),), (Channel("F"),)))
+    assert said is not None and "If x is an imposed motion" in said
+
+
 def test_nothing_is_named_on_a_record_of_the_controller_and_the_first_sentence_says_so():
     made = [loop(seed, closed=True) for seed in range(5)]
     training = TrainingSet(tuple(made[:3]), (made[3],), 10, CHANNELS)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from simgap.diagnosis.gains import measure
 from simgap.error_views.correlation import correlation_time
@@ -180,6 +181,25 @@ def test_a_simulation_that_errs_more_than_the_mean_of_the_data_shows_nothing(siz
     gain = measure(dataset(y), *([part[2:] + of * spread for part in y] for of in (5.0, size)))
     assert gain.low > 0
     assert (gain.beats_mean, gain.shown) == (shown, shown)
+
+
+def test_an_offset_of_the_readings_makes_no_simulation_better():
+    rng = np.random.default_rng(10)
+    y = [300 + 0.1 * rng.standard_normal((400, 1)) for _ in range(3)]  # a temperature in kelvin
+    gain = measure(dataset(y), *([part[2:] + of * rng.standard_normal((398, 1)) for part in y] for of in (0.5, 0.15)))
+    assert gain.low > 0 and not gain.beats_mean
+
+
+def test_numbers_that_were_fitted_to_a_test_experiment_gain_nothing_where_there_is_nothing():
+    rng, n, gains = np.random.default_rng(11), 400, []
+    shapes = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n - 2), 4))[0]
+    for _ in range(40):
+        noise = [lfilter([1], [1, -0.9], rng.standard_normal(n))[:, None] for _ in range(4)]
+        zero = [np.zeros((n - 2, 1)) for _ in noise]
+        fitted = [shapes @ (shapes.T @ part[2:]) for part in noise]
+        gains.append([measure(dataset(noise), zero, fitted, own) for own in ((), (5,))])
+    unpaid, paid = (np.array([gain.low > 0 for gain in of]) for of in zip(*gains, strict=True))
+    assert unpaid.mean() > 0.5 and paid.mean() < 0.1
 
 
 @pytest.mark.slow

@@ -30,8 +30,8 @@ def promised(two_effects, identified, monkeypatch):
     """What is promised where the test data confirm models of up to so many effects."""
 
     def promised(confirmed, beats_mean=True):
-        def measure(dataset, before, after):
-            gain = real(dataset, before, after)
+        def measure(*runs):
+            gain = real(*runs)
             return replace(gain, low=0.1 if len(tried.pop()) <= confirmed else -0.1, beats_mean=beats_mean)
 
         real, tried, only = gains.measure, [], promises.only

@@ -13,7 +13,7 @@ from simgap.cli import main
 from simgap.data.simulated.rigs import hide
 from simgap.experiment_design.limits import limits_of
 from simgap.experiment_design.search import best_record
-from simgap.records import UnusableInput
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet, UnusableInput
 
 TWINS = PAIRS["friction or dead zone"]
 
@@ -138,3 +138,26 @@ def test_a_record_of_a_controller_gets_no_design(data):
     answer = simgap.next_record(replace(data, training=training, sha256=""))
     assert "shows the controller" in " ".join(str(answer).split())
     assert answer.design is None
+
+
+@pytest.mark.parametrize(
+    ("limits", "complaint"),
+    [
+        ({"seconds": 1e6}, "a record may have 100000 samples at most"),
+        ({"rate": {"load": 3.0}}, "'load' does not move within a record"),
+    ],
+)
+def test_limits_that_no_record_can_keep_are_refused(limits, complaint):
+    u = np.column_stack((np.sin(np.arange(100)), np.full(100, 2.0)))
+    train, test = ((Experiment(name, u, np.cumsum(u[:, :1], axis=0), 0.1),) for name in ("train", "test"))
+    channels = Channels((Channel("u", "V"), Channel("load", "kg")), (Channel("y", "m"),))
+    data = Dataset("cart", TrainingSet(train, (), 5, channels), test, 5, channels)
+    with pytest.raises(UnusableInput, match=complaint):
+        limits_of(data, **limits)
+
+
+def test_a_column_with_a_comma_in_its_name_can_be_read_again(answer, tmp_path):
+    channels = replace(answer.channels, inputs=(replace(answer.channels.inputs[0], name="Voltage, V"),))
+    replace(answer, channels=channels).write(tmp_path / "next.csv")
+    with (tmp_path / "next.csv").open() as file:
+        assert next(csv.reader(file)) == ["t", "Voltage, V"]

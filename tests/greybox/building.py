@@ -153,7 +153,7 @@ def trial(
     blocks = np.ones(20) if held_out is None else np.asarray(held_out, dtype=float)
     likelihoods = float(log_likelihood), float(held_out_gain)
     terms = tuple(term(name) for name in effects)
-    return Trial(terms, estimate, *likelihoods, parameters, own, own_there, memory, blocks)
+    return Trial(terms, estimate, search.train, *likelihoods, parameters, own, own_there, memory, blocks)
 
 
 def by_the_other_half(search, trial):

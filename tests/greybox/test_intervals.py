@@ -72,3 +72,17 @@ def test_the_intervals_of_a_machine_hold_the_truth_where_one_short_record_tells_
         low, high = ends_of(plant)
         held += (low[at] <= true) & (high[at] >= true)
     assert (held >= binom.ppf(1e-4, SEEDS, 0.95)).all(), held
+
+
+def test_the_intervals_hold_the_truth_where_one_record_is_long_and_many_are_short():
+    """Blocks are cut by samples: else a record of 4000 would be one draw of forty."""
+    rng, held, seeds = np.random.default_rng(4), np.zeros(2), 20
+    lengths = [2000] + [50] * 39
+    u = steps(rng, (40, 2000), low=-0.6)
+    y, _ = free_run(velocity(*TRUE), u, 0.1, rng.uniform(-0.5, 0.5, (40, 1)))
+    for seed in range(seeds):
+        e, _ = coloured(np.random.default_rng([4, seed]), u.shape, (0.95,), 0.05)
+        made = experiments(u, y + e[:, :, None], 0.1, lengths)
+        _, low, high = plant_with_interval(plain_search(made, made[-1:], "velocity"), made)
+        held += (low <= TRUE) & (high >= TRUE)
+    assert (held >= binom.ppf(1e-4, seeds, 0.95)).all(), held

@@ -139,7 +139,7 @@ def test_an_offer_is_called_an_offer(unexplained):
     assert "Something is there, but nothing in the catalogue explains it: 27 % of" in text
     assert "An offer to look at, not a finding" in text
     assert "force ~ +1 x^3 -0.2 v" in text
-    assert "explains 44 % of the squared error of the force, held out" in text
+    assert "explains 44 % of the squared error of x that is left in training" in text
     assert "Cause 1" not in text
 
 

@@ -37,6 +37,27 @@ def test_up_to_four_test_experiments_have_columns_of_their_own(results):
     assert best(table, "RMSE level first [V]") == ["arx"]
 
 
+def test_the_median_of_two_seeds_lies_between_them_in_every_column(make_row):
+    table = dataset_table([make_row(rmse=rmse, seed=seed) for seed, rmse in enumerate((0.2, 0.4))], "tanks")
+    assert column(table, "seeds") == {"arx": "2"}
+    assert column(table, "RMSE level [V]") == {"arx": "0.3 (0.2 to 0.4)"}
+    assert column(table, "fit %") == {"arx": "85.0 (80.0 to 90.0)"}
+
+
+def test_seeds_of_different_code_are_said_to_be_so(make_row):
+    rows = [make_row(rmse=0.2, seed=seed, provenance={"model_sha256": str(seed)}) for seed in range(2)]
+    assert dataset_table(rows, "tanks").notes == ["The seeds of arx come from different versions of the code."]
+    assert not dataset_table(rows[:1], "tanks").notes
+
+
+def test_a_model_that_ran_on_few_data_sets_comes_after_those_that_ran_on_all(make_row):
+    made = [("arx", 0.5, "a"), ("arx", 0.5, "b"), ("best", 0.1, "a"), ("mean", 9.0, "a"), ("mean", 0.4, "b")]
+    rows = [replace(make_row(name, rmse=rmse), dataset=dataset) for name, rmse, dataset in made]
+    table = overview(rows)
+    assert [row[0].text for row in table.rows] == ["arx", "mean", "best"]
+    assert any("more data sets come first" in note for note in table.notes)
+
+
 def test_more_test_experiments_are_pooled_by_their_samples(make_row):
     rows = [make_row("arx", str(i), rmse=float(i), n=100 * (i + 1)) for i in range(5)]
     table = dataset_table(rows, "tanks")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 import simgap
 from simgap.baselines import arx
@@ -173,6 +174,21 @@ def test_the_command_prints_markdown_and_ends_with_1_for_worse_and_0_for_same(tm
     assert "<b>" not in printed
     assert (tmp_path / "table.md").read_text() in printed
     assert json.loads((tmp_path / "table.json").read_text())["passed"] is False
+
+
+def test_a_recovery_study_beside_the_suites_is_not_compared(tmp_path):
+    for folder in ("reference", "new"):
+        store.append(tmp_path / folder, "smoke", [result("arx", 1.0)])
+        (tmp_path / folder / "recovery").mkdir()
+        (tmp_path / folder / "recovery" / "cases.jsonl").write_text('{"case": 1}\n')
+    assert not simgap.check(tmp_path / "new", tmp_path / "reference").wrong
+
+
+def test_a_deterministic_model_may_grow_as_far_as_its_seeds_do_once_in_a_thousand():
+    before = [result("arx", 0.5 + 1e-3 * by, seed) for seed, by in enumerate(GROWTH)]
+    reach = 0.5 + t.ppf(0.999, 3) * math.sqrt(2) * 1e-3 * np.std(GROWTH, ddof=1)
+    for rmse, verdict in ((reach - 1e-6, "same"), (reach + 1e-6, "worse")):
+        assert verdicts(before, [result("arx", rmse)])["test, free_run, y", 0] == verdict
 
 
 @pytest.mark.parametrize(

@@ -254,9 +254,9 @@ def test_a_killed_training_carries_on_from_its_last_epoch(suite, tmp_path):
     slow = tmp_path / "slow.toml"
     slow.write_text(head + '[[models]]\nname = "gru"\nparams = { units = 4, epochs = 400, batches = 20 }\n')
     with subprocess.Popen([*COMMAND, str(slow), "--out", str(out)], stdout=subprocess.DEVNULL) as process:
-        wait_for(out / ".checkpoints", lambda folder: any(folder.glob("*.safetensors")))
+        wait_for(out / ".checkpoints", lambda folder: any(folder.glob("*/*.safetensors")))
         process.kill()
-    (checkpoint,) = (out / ".checkpoints").glob("*.safetensors")
+    (checkpoint,) = (out / ".checkpoints").glob("*/*.safetensors")
     with safe_open(checkpoint, "np") as file:
         known = json.loads(file.metadata()["history"])["train"]
     assert 0 < len(known) < 400

@@ -124,3 +124,11 @@ def test_every_module_of_simgap_is_found_by_its_name():
         assert source._of_simgap(name).samefile(path), name
     assert source._of_simgap("simgap.nosuch") is None
     assert isinstance(source._of_simgap("simgap.records"), Path)
+
+
+def test_two_models_of_one_file_are_told_apart(tmp_path):
+    file = tmp_path / "two.py"
+    methods = "    def fit(self, data, seed): ...\n    def simulate(self, u, y_init): ...\n"
+    file.write_text(f"class One:\n{methods}\n\nclass Other:\n{methods}")
+    one, other = (model_code(Entry(f"{file}:{name}", {}, "mine")).sha256() for name in ("One", "Other"))
+    assert one != other
