@@ -26,6 +26,7 @@ def odd_runs(model: Any, dataset: Dataset) -> tuple[str, ...]:
     odd = [i for i in np.argsort(-errors) if errors[i] > FAR * usual][:MOST_NAMED]
     return tuple(
         f"The run {runs[i].name} is explained by no model: its mean absolute error is "
-        f"{amount(float(errors[i]), unit, 2)}, {errors[i] / usual:.0f} times the usual one. The machine may have stuck or slipped there."
+        f"{amount(float(errors[i]), unit, 2)}, {errors[i] / usual:.0f} times the usual one. "
+        "The machine may have stuck or slipped there."
         for i in odd
     )
