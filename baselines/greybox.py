@@ -24,7 +24,7 @@ from simgap.registry import EFFECTS, MODELS
 class GreyBox(GreyBoxModel):
     """x' = A x + B (u' + f), y = C x: low order, with effects of the catalogue on input, force or output.
 
-    Order 1 for a velocity, 2 for a position, else what held-out data ask for up to 4; fitted by simulation error
+    Order 1 for a velocity, 2 for a position, else what held-out data ask for up to 8; fitted by simulation error
     (Ljung 1999, section 4.2) from several starts, with the start state of every experiment estimated along.
     effects: names of `simgap list effects`, or one of them, "name:channel" where an effect can sit on several channels.
     """

@@ -158,7 +158,7 @@ class Findings:
 
     dataset: str
     verdict: Verdict
-    baseline: dict[str, Any]  # order, rmse and fit_percent per output, and poles
+    baseline: dict[str, Any]  # order, rmse and fit_percent per output
     wrong: tuple[Wrong, ...]
     causes: tuple[Cause, ...]
     runner_up: dict[str, Any] | None  # effect, title, gain, margin (log-likelihood)

@@ -57,7 +57,7 @@ class Choice:
     def __str__(self) -> str:
         model = f"the linear model with {', '.join(self.effects)}" if self.effects else "the plain linear model"
         told = (
-            f"{self.dataset}: Take {self.best} next. The numbers of {model} are not certain yet, so it would err on "
+            f"{self.dataset}: Take {self.best} next. The parameters of {model} are not certain yet, so it would err on "
             f"the candidates; a fit to this record too leaves {percent(self.left[0])} of that squared error."
         )
         width = max(map(len, self.names[:SHOWN]))
@@ -66,10 +66,10 @@ class Choice:
         parts = [textwrap.fill(told, 100), "\n".join([title, *rows[:SHOWN]])]
         if self.taken:
             several = "candidates have" if len(self.taken) > 1 else "candidate has"
-            parts.append(f"{len(self.taken)} {several} the inputs of a record at hand: left out.")
+            parts.append(f"{len(self.taken)} {several} the inputs of an existing record: left out.")
         parts.append(textwrap.fill(
-            "What the model lacks is not counted: an effect that no record at hand shows has no number yet. Diagnose "
-            "again with the new record before the next choice.", 100))  # fmt: skip
+            "What the model lacks is not counted: an effect that none of the records shows has no parameters yet. "
+            "Diagnose again with the new record before the next choice.", 100))  # fmt: skip
         return "\n\n".join(parts)
 
 

@@ -125,7 +125,7 @@ def silverbox(folder: Path) -> Dataset:
     Channels: input voltage, standing for a force [V] -> output voltage, standing for a position [V].
     Samples: multisine, 65062 to train on, of which the last quarter validates; tests multisine 21688,
     arrow_full 40475 (noise of growing amplitude, beyond the training data at its end),
-    arrow_no_extrapolation, its first 32000; every 1/610.35 s; n_init 50.
+    arrow_no_extrapolation, its first 32000, which pooled figures count twice; every 1/610.35 s; n_init 50.
     Source: T. Wigren and J. Schoukens, Three free data sets for development and benchmarking in nonlinear
     system identification, European Control Conference, pp. 2933-2938, Zurich, 2013.
     Licence: not stated in the files.

@@ -40,8 +40,8 @@ def nothing_found(findings: Findings) -> str:
     if not findings.simulation.linear_differs:
         return "Nothing found: your simulation lacks nothing that these data show."
     return (
-        "Your simulation lacks no effect that these data show, but the numbers of its linear part are not those of the "
-        f"machine; corrected, its free-run error on the test experiments falls by {percent(findings.gain.share)}."
+        "Your simulation lacks no effect that these data show, but the parameters of its linear part are not those of "
+        f"the machine; corrected, its free-run error on the test experiments falls by {percent(findings.gain.share)}."
     )
 
 
@@ -60,7 +60,10 @@ def evidence(cause: Cause) -> str:
     assert cause.holds is not None
     made = f"By itself this makes {percent(cause.evidence)} of your simulation's squared error in training."
     if cause.evidence > 1:
-        made = "By itself this would make a larger error than your simulation has: its other numbers make up for part."
+        made = (
+            "By itself this would make a larger error than your simulation has: its other parameters make up for part "
+            "of it."
+        )
     return f"{HOLDS[cause.holds]} {made}"
 
 
@@ -77,7 +80,7 @@ def linear_part(findings: Findings) -> list[str]:
     if about is None or not about.linear_differs:
         return []
     share = percent(min(about.linear_share, 1.0))
-    lines = [f"By themselves, wrong numbers make {share} of your simulation's squared error in training."]
+    lines = [f"By themselves, wrong parameters make {share} of your simulation's squared error in training."]
     for n in about.linear:
         value = Value(n.name, n.unit, n.value, n.low, n.high)
         said = f"{n.name} = {numbers.estimate(value)} ({numbers.interval(value)})"

@@ -38,7 +38,7 @@ def headline(findings: Findings) -> str:
         return f"Suspected, not shown: {listed}. The training data ask for {them}, but {_not_shown(findings)} {change}."
     whose, corrected = ("Your", "corrected,") if findings.simulation else ("The", f"with {them}")
     wrong_numbers = findings.simulation is not None and findings.simulation.linear_differs
-    listed += ", and of numbers of its linear part" * wrong_numbers
+    listed += ", and of wrong parameters of its linear part" * wrong_numbers
     said = (
         f"{whose} simulation errs because of {listed}; {corrected} the free-run error on the test experiments {change}."
     )
@@ -134,7 +134,7 @@ def titles_of(findings: Findings, output: str) -> dict[str, str]:
     """Map the names of causes in an output's budget to their titles."""
     causes = [replace(cause, output="") for cause in findings.causes if cause.output in ("", output)]
     titles = {cause.effect: cause_title(cause, findings) for cause in causes}
-    titles["linear_part"] = "numbers of the linear part"
+    titles["linear_part"] = "parameters of the linear part"
     return titles | {f"{cause.effect}:{cause.channel}": f"{cause.title} ({cause.channel})" for cause in causes}
 
 

@@ -89,7 +89,7 @@ def test_a_simulation_with_nothing_but_wrong_numbers_in_its_linear_part_is_told_
     wrong = diagnose(dataset, simulated=simulation(dataset, "cart", {"dead_zone": 1.0}, 0.8), views_too=False)
     assert (wrong.verdict, wrong.causes) == ("nothing_found", ())
     assert wrong.findings.simulation.linear_differs
-    assert "numbers of its linear part are not those of the machine" in " ".join(str(wrong).split())
+    assert "parameters of its linear part are not those of the machine" in " ".join(str(wrong).split())
 
 
 def test_a_record_in_the_place_of_its_simulation_lacks_nothing():

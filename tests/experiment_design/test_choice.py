@@ -62,7 +62,7 @@ def test_the_answer_names_record_effects_and_what_it_does_not_count(choice):
     text = " ".join(str(choice).split())
     assert "Take strong next" in text
     assert "Coulomb friction" in text
-    assert "1 candidate has the inputs of a record at hand: left out." in text
+    assert "1 candidate has the inputs of an existing record: left out." in text
     assert "What the model lacks is not counted" in text
 
 
