@@ -13,6 +13,7 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
+from simgap.greybox.plant import Plant
 from simgap.greybox.position_and_velocity import plants_of
 from simgap.greybox.terms import Term
 from simgap.records import Channel, TrainingSet, UnusableInput
@@ -44,6 +45,7 @@ class GreyBox(GreyBoxModel):
             for effect, plant, channel in placed:
                 # What is not simulated is left out of the records by the baseline itself.
                 if effect.simulated and (plant is None or plant == outputs):
+                    _check_that_it_acts(Term(effect, channel), estimate.plant)
                     larger = add(baseline, estimate, Term(effect, channel))
                     estimate = from_other_poles(baseline, estimate, larger)
             chosen.append((estimate, baseline))
@@ -55,6 +57,16 @@ class GreyBox(GreyBoxModel):
         alone = copy.copy(self)
         alone.plants = [FittedPlant.fit(*found, self._train) for found in self._chosen]
         return alone
+
+
+def _check_that_it_acts(term: Term, plant: Plant) -> None:
+    """Raise UnusableInput for an effect that changes nothing on such a plant, or has nowhere to begin."""
+    assert plant.scales is not None
+    scales = plant.scales.of(term)
+    if not term.effect.applies_to(scales) or not term.effect.starts(scales):
+        what = {"other": "an output of no known kind"}.get(plant.kind, f"a {plant.kind}")
+        raise UnusableInput(f"{term.effect.name} does not act on {what} of order {plant.order} in these records; "
+                            "leave it out, or say with kind what the output is")  # fmt: skip
 
 
 def _place(name: str, data: TrainingSet) -> tuple[Effect, tuple[int, ...] | None, int]:

@@ -9,8 +9,8 @@ from reprlib import repr as short
 from typing import get_args
 
 from simgap.data.formats.headings import find, heading_of, listed
-from simgap.data.formats.units import Quantity, plain, quantity
 from simgap.records import Channels, Dataset, Kind, UnusableInput
+from simgap.units import Quantity, plain, quantity
 
 KINDS = get_args(Kind)
 

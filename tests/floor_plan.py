@@ -6,11 +6,12 @@ ROOT = Path(__file__).parents[1]
 FOLDERS = {"benchmark": "simgap", "baselines": "simgap.baselines", "neural": "simgap.neural",
            "data": "simgap.data", "reports": "simgap.reports"}  # fmt: skip
 
-GROUND = {"records", "known_plant", "protocol", "registry", "step_form", "cores", "stages"}
+GROUND = {"records", "known_plant", "protocol", "registry", "step_form", "cores", "stages", "units"}
 RUN = {"metrics", "tasks", "results", "running"}
 # Room or module -> what it may import besides itself. "simgap" is the lazy exports of the package.
 MAY_IMPORT: dict[str, set[str]] = {
     "known_plant": set(),
+    "units": set(),
     "records": {"known_plant"},
     "cores": set(),
     "stages": set(),
@@ -27,7 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "running": GROUND | {"metrics", "tasks", "results", "data"},
     "subspace": {"records"},
     "greybox": GROUND | {"findings", "error_views", "subspace"},
-    "error_views": {"records", "metrics", "wording"},
+    "error_views": {"records", "metrics", "units", "wording"},
     "baselines": GROUND | {"metrics", "data", "error_views", "greybox", "subspace"},
     "neural": GROUND | {"data"},
     "saved": GROUND | RUN | {"data"},
@@ -37,7 +38,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reports": {"records", "registry", "metrics", "results", "data", "wording"}
     | {"findings", "error_views", "greybox.effects"},
     # An answer shows itself in a notebook, so that diagnosis lies above reports.
-    "diagnosis": GROUND | RUN | {"findings", "their_simulation", "data", "greybox", "error_views", "reports"},
+    "diagnosis": GROUND
+    | RUN
+    | {"findings", "their_simulation", "data", "greybox", "error_views", "reports", "wording"},
     "recovery": GROUND | RUN | {"findings", "data", "diagnosis"},
     "experiment_design": GROUND | {"data", "diagnosis", "greybox", "wording"},
     "simgap": GROUND | RUN | {"data", "diagnosis", "experiment_design", "exports", "reports", "saved"},

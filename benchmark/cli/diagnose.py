@@ -36,7 +36,7 @@ def diagnose(
         list[str] | None,
         typer.Option(help="Column with the output of your own simulation, which is diagnosed; one for each output."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the resampling.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the answer as one page with plots to this file.")] = None,
     save: Annotated[Path | None, typer.Option(help="Write the model that the answer ends with into this file.")] = None,

@@ -15,6 +15,7 @@ from simgap.cli.options import (
     Resample,
     SamplingTime,
     SplitGaps,
+    model_faults,
     parse_params,
     read_data,
 )
@@ -40,7 +41,7 @@ def export(
     resample: Resample = None,
     split_gaps: SplitGaps = False,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the fit.")] = 0,
 ) -> None:
     """Write a model as another simulator reads it, run it there, and say how far it is from our free run."""
     from simgap.data.formats.plant_table import parse_known
@@ -65,7 +66,8 @@ def export(
             exports.check_model(model, to)
             records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps).dataset
             params = parse_params(param or ())
-        done = exports.export(model, records, to, out, params, seed, experiment, dt, table, into, joint)
+        with model_faults("export"):
+            done = exports.export(model, records, to, out, params, seed, experiment, dt, table, into, joint)
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

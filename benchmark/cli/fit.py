@@ -20,6 +20,7 @@ from simgap.cli.options import (
     SamplingTime,
     SplitGaps,
     check_writable,
+    model_faults,
     parse_params,
     read_data,
     write_json,
@@ -46,14 +47,13 @@ def fit(
     split_gaps: SplitGaps = False,
     known: KnownOf = None,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the fit.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the fit.")] = 0,
     save: Annotated[Path | None, typer.Option(help="Write the fitted model into this file.")] = None,
     json: Json = None,
 ) -> None:
     """Fit one model and print what it chose and how well it simulates the test experiments."""
     from rich.console import Console
 
-    from simgap.records import UnusableInput
     from simgap.results import store
     from simgap.running import fitting
     from simgap.saved.archive import save_model
@@ -64,16 +64,10 @@ def fit(
     if save is not None:
         name_of(fitting.model_class(model))  # refuses what no file could name
     console = Console()
-    try:
-        fitting.check_params(model, params)  # first, because data may take seconds to load
-        dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
-        with _progress(console):
-            done = fitting.fit(model, dataset, params, seed)
-    except (UnusableInput, KeyboardInterrupt, OSError):
-        raise
-    except Exception as error:  # the model's own fault, without our traceback
-        typer.echo(f"simgap: {fitting.reason('fit', error)}", err=True)
-        raise typer.Exit(1) from None
+    fitting.check_params(model, params)  # first, because data may take seconds to load
+    dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
+    with model_faults("fit"), _progress(console):
+        done = fitting.fit(model, dataset, params, seed)
     if json is not None:
         write_json(json, store.encoded(done.results))
     _print_model(console, done)

@@ -49,7 +49,7 @@ def next_record(
         Path | None,
         typer.Option(help="Choose among records that could be taken: a file, or a folder of files, with the inputs."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the signals that are tried.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the signals that are tried.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write time and inputs of the record into this CSV file.")] = None,
     json: Json = None,
 ) -> None:

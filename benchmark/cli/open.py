@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import webbrowser
 from contextlib import suppress
 from typing import Annotated
@@ -49,6 +50,8 @@ def open_page(
     typer.echo(f"Open {server.address}\nCtrl-C ends it and deletes what was uploaded.")
     if not no_browser:
         webbrowser.open(server.address)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # a terminal that is closed ends it as Ctrl-C does
+        signal.signal(signal.SIGHUP, lambda *_: signal.raise_signal(signal.SIGTERM))
     with suppress(KeyboardInterrupt):
         server.run()
     typer.echo("Ended, and deleted what was uploaded.")

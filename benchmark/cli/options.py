@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,6 +113,20 @@ def read_data(
     if str(reading):
         typer.echo(str(reading))
     return reading
+
+
+@contextmanager
+def model_faults(step: str) -> Iterator[None]:
+    """End with exit code 1 and one line, not our traceback, where a model raises something of its own in a step."""
+    from simgap.running import fitting
+
+    try:
+        yield
+    except (UnusableInput, KeyboardInterrupt, OSError, typer.Exit):
+        raise
+    except Exception as error:
+        typer.echo(f"simgap: {fitting.reason(step, error)}", err=True)
+        raise typer.Exit(1) from None
 
 
 def check_writable(*files: Path | None) -> None:

@@ -16,6 +16,7 @@ from simgap.cli.options import (
     SamplingTime,
     SplitGaps,
     check_writable,
+    model_faults,
     parse_params,
     read_data,
     write_json,
@@ -31,7 +32,7 @@ def range_test(
     resample: Resample = None,
     split_gaps: SplitGaps = False,
     param: Annotated[list[str] | None, typer.Option(help="name=value of the model; repeatable.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the weights and of the batches.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the weights and of the batches.")] = 0,
     json: Json = None,
     html: Annotated[Path | None, typer.Option(help="Write the curve as a page to this file.")] = None,
 ) -> None:
@@ -48,7 +49,9 @@ def range_test(
     if not hasattr(built, "range_test"):
         raise UnusableInput(f"{model} has no learning rate; networks have: see `simgap list models`")
     dataset = read_data(data, inputs, outputs, dt, None, resample, split_gaps).dataset
-    curve = LearningRates(model, dataset.name, *built.range_test(dataset.training, seed))
+    with model_faults("fit"):
+        rates, losses = built.range_test(dataset.training, seed)
+    curve = LearningRates(model, dataset.name, rates, losses)
     if json is not None:
         write_json(json, curve.to_json())
     if html is not None:

@@ -35,7 +35,7 @@ def measure(
         share = 1 - |e_after| / |e_before|,   over all outputs, each divided by its standard deviation
 
     with the 95 % interval of `share_with_interval`. `own` numbers of each output were fitted to each test experiment
-    itself, which takes own / (N / tau) of N errors of memory tau even where nothing is there; that is put back.
+    itself, and take of the error even where nothing is there; `_price` puts that back.
     """
     n = dataset.n_init
     y = np.concatenate([x.y[n:] for x in dataset.test])  # [N, ny]
@@ -59,12 +59,14 @@ def measure(
 
 
 def _price(error: Float[np.ndarray, " N"], lengths: np.ndarray, own: int) -> float:
-    """What squared errors grow by when as many numbers of each experiment are not fitted to them."""
-    if not own:
-        return 1.0
-    fitted = own * len(lengths)
-    independent = len(error) / correlation_time(error, lengths, fitted)[0]
-    return independent / max(independent - fitted, 1e-3)
+    """What the mean square of errors would grow by on data to which `own` numbers of each experiment were not fitted.
+
+        (N / tau + p) / (N / tau - p)   for p numbers and N errors of memory tau
+
+    (final prediction error: Akaike, Annals of the Institute of Statistical Mathematics 22, 1970).
+    """
+    fitted, independent = own * len(lengths), len(error) / correlation_time(error, lengths, 0)[0]
+    return (independent + fitted) / max(independent - fitted, 1e-3)
 
 
 def errors_by_output(dataset: Dataset, simulated: Sequence[np.ndarray]) -> dict[str, dict[str, float]]:

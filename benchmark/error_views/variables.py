@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from simgap.error_views.wording import between, span
+from simgap.units import of_motion
 from simgap.wording import amount
 
 LEAST = 20  # samples in a bin
@@ -85,7 +86,7 @@ def _merge(
 
 def bin_direction(v: Float[np.ndarray, " N"], unit: str) -> Bins | None:
     """Sort samples by the sign of the velocity: back, forwards, and at rest if enough samples are."""
-    verb = "turning" if unit.startswith(("deg", "rad", "°")) else "moving"
+    verb = "turning" if of_motion(unit).kind == "angle" else "moving"
     label, words = direction(v) + 1, (f"when {verb} back", "at rest", f"when {verb} forwards")
     count = np.bincount(label, minlength=3)
     least = min(LEAST, len(v) // 4)
@@ -103,7 +104,7 @@ def bin_reversals(v: Float[np.ndarray, " N"], lengths: Sequence[int], dt: float,
     The error of backlash changes its sign from one reversal to the next, so that it would cancel without the direction.
     Centres are in s, negative for motion back.
     """
-    verb = "turning" if unit.startswith(("deg", "rad", "°")) else "moving"
+    verb = "turning" if of_motion(unit).kind == "angle" else "moving"
     since, signs = by_experiment(lambda part: since_reversal(part) * dt, v, lengths), np.sign(direction(v))
     labels = np.full(len(v), -1)
     centres: list[float] = []

@@ -89,7 +89,9 @@ def limits_of(
     dt = dataset.training.dt
     usual = min(dt * LONGEST, dt * max(len(x) for x in dataset.training.train))
     wanted = usual if seconds is None else seconds
-    if not dt * 2 * dataset.n_init <= wanted < np.inf:
+    if not np.isfinite(wanted):
+        raise UnusableInput(f"seconds {wanted:g}: give a finite number of seconds")
+    if wanted < dt * 2 * dataset.n_init:
         least = 2 * dataset.n_init
         raise UnusableInput(f"seconds {wanted:g}: a record needs {least} samples, that is {least * dt:g} s, or more")
     if wanted > MOST * dt:

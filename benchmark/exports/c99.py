@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 # What parameters without an annotation are: those of the effects' laws.
 USUAL = {"p": "list", "m": "list", "i": "int", "j": "int", "k": "int"}
 BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Mod: "%", ast.FloorDiv: "/"}
+# A sample count times the substeps of 10 kHz fills an int within a day.
+C_TYPES = {"double": "double", "int": "long long"}
 COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 CALLS = {"abs": "fabs", "min": "smaller", "max": "larger", "round": "rint"}
 PREAMBLE = """\
@@ -59,10 +61,10 @@ class _Function:
         self.known[self.node.name] = self.signature
         declared = [
             f"    double {name}[{self.arrays[name]}] = {{0.0}};" if name in self.arrays
-            else f"    {self.kinds[name]} {name} = 0;" for name in locals_
+            else f"    {C_TYPES[self.kinds[name]]} {name} = 0;" for name in locals_
         ]  # fmt: skip
         arguments = ", ".join(
-            f"{'' if name in self.changed else 'const '}double *{name}" if kind == "list" else f"{kind} {name}"
+            f"{'' if name in self.changed else 'const '}double *{name}" if kind == "list" else f"{C_TYPES[kind]} {name}"
             for name, kind in zip(self.arguments, self.signature.kinds, strict=True)
         )
         comment = [f"/* {document.replace('*/', '* /')} */"] if document else []
@@ -173,7 +175,7 @@ class _Function:
             case ast.Attribute(value=ast.Name(id="math"), attr=name):
                 return f"{name}({', '.join(arguments)})"
             case ast.Name(id="int"):
-                return f"(int){arguments[0]}"
+                return f"(long long){arguments[0]}"
             case ast.Name(id="float"):
                 return f"(double){arguments[0]}"
             case ast.Name(id="min" | "max" as name) if len(arguments) == 2:

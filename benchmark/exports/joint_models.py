@@ -10,13 +10,13 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.exports.grey_boxes import GreyBoxStep
-from simgap.exports.joints import CHANGES, LENGTHS, Joint
+from simgap.exports.joints import CHANGES, Joint
 from simgap.exports.subjects import CheckRecord, Subject, step_of, usual_inputs
 from simgap.greybox.machine import ARM, BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import Plant
-from simgap.known_plant import ANGLES
 from simgap.records import UnusableInput
+from simgap.units import of_motion
 
 NO_INERTIA = (
     "forces need the inertia of the joint, in kg m^2 or kg, or the torque constant, in N m or N per unit of the first "
@@ -142,15 +142,13 @@ def _single(subject: Subject, simulator: str) -> FittedPlant:
 
 def _scale(subject: Subject, output: int) -> tuple[Literal["hinge", "slide"], float]:
     channel = subject.fitted_on.channels.outputs[output]
-    unit = channel.unit.strip().removesuffix("/s")
-    if unit in ANGLES:
-        return "hinge", ANGLES[unit]
-    if unit in LENGTHS:
-        return "slide", LENGTHS[unit]
-    raise UnusableInput(
-        f"the unit of {channel.name} is {channel.unit or 'not given'!r}, which is neither an angle nor a length; "
-        f"known are {', '.join([*ANGLES, *LENGTHS])}, for a velocity with /s"
-    )
+    motion = of_motion(channel.unit)
+    if not motion.kind:
+        raise UnusableInput(
+            f"the unit of {channel.name} is {channel.unit or 'not given'!r}, which is neither an angle nor a length; "
+            "write one, such as deg, mm, rad/s or rpm"
+        )
+    return "hinge" if motion.kind == "angle" else "slide", motion.factor
 
 
 def _inertia(known: Mapping[str, float], gain: float) -> float:

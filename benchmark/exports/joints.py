@@ -11,7 +11,6 @@ import numpy as np
 
 POINT = 1e-6  # of the inertia: that of a point mass about its centre
 STANDARD_GRAVITY = 9.80665  # m/s^2
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}  # in m, as ANGLES in rad; a velocity's is that per second
 CANNOT = "this simulator cannot"
 
 
@@ -43,7 +42,7 @@ class Joint:
 # of the plant, other words the parameters of the effect. What has no place there, the simulator cannot.
 MJCF: dict[str, tuple[str, str, str]] = {
     "coulomb_friction": ("joint frictionloss", "J c friction force", "N m or N"),
-    "constant_load": ("actuator biasprm[0]", "J c load", "N m or N"),
+    "constant_load": ("actuator biasprm[0]", "J c force", "N m or N"),
     "quadratic_drag": ("joint damping[1]", "J drag / c", "N m s^2/rad^2"),
     "quadratic_stiffness": ("joint stiffness[1]", "J stiffness / c", "N m/rad^2"),
     "cubic_stiffness": ("joint stiffness[2]", "J stiffness / c^2", "N m/rad^3"),

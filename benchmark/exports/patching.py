@@ -54,7 +54,10 @@ class Robot:
         mujoco.mj_fullM(model, data, masses)
         i = names.index(joint)
         dof = int(model.jnt_dofadr[i])
-        text = file.read_text(encoding="utf-8")
+        try:
+            text = file.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise UnusableInput(f"--into {file}: it is not written in UTF-8; save it so") from error
         radians = re.search(r"<compiler\b[^>]*\bangle\s*=\s*[\"']radian", _without_comments(text))
         inertia = float(masses[dof, dof] - model.dof_armature[dof])
         return cls(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.drive import Drive
-from simgap.greybox.effects.effect import ForceEffect, InputEffect, OutputEffect
+from simgap.greybox.effects.effect import Effect, ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
 from simgap.greybox.model import FittedPlant
 from simgap.greybox.plant import Plant
@@ -19,6 +20,11 @@ from simgap.greybox.two_masses import ENTRY
 from simgap.records import UnusableInput
 
 Law = tuple[str, Callable[..., float], tuple[Callable[..., float], ...]]  # its name, and the functions that it calls
+
+
+def law_name(effect: Effect) -> str:
+    """Name the law of an effect: by its class, because a finer law has the name of the effect that it refines."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(effect).__name__).lower()
 
 
 class Cells:
@@ -67,7 +73,7 @@ class PlantWriter:
         """Yield the name, the law and its helpers, of every effect."""
         for term in self.plant.terms:
             effect: Any = term.effect
-            yield effect.name, effect.term if isinstance(effect, ForceEffect) else effect.step, effect.helpers
+            yield law_name(effect), effect.term if isinstance(effect, ForceEffect) else effect.step, effect.helpers
 
     def constants(self) -> dict[str, np.ndarray]:
         """Give the parameters, the transition over a substep, and the rows that the outputs read."""
@@ -110,7 +116,7 @@ class PlantWriter:
         for term in self.plant.on("input", channel):
             assert isinstance(term.effect, InputEffect)
             at, cells = self.plant.part_of(term).start, self.memory[term]
-            lines.append(f"    u = {term.effect.name}(u, {self.of_theta}, {at}, s, {cells}, {self.h!r}, k)")
+            lines.append(f"    u = {law_name(term.effect)}(u, {self.of_theta}, {at}, s, {cells}, {self.h!r}, k)")
         return "\n".join([*lines, "    return u"])
 
     def forces(self, role: str, x: str, v: str, h: str) -> list[tuple[Term, str]]:
@@ -118,7 +124,7 @@ class PlantWriter:
         found = [term for term in self.plant.on("force") if term.effect.role == role]
         at = [(self.plant.part_of(term).start, self.memory[term]) for term in found]
         calls = [
-            f"{term.effect.name}({x}, {v}, t, {h}, {self.of_theta}, {p}, s, {m})"
+            f"{law_name(term.effect)}({x}, {v}, t, {h}, {self.of_theta}, {p}, s, {m})"
             for term, (p, m) in zip(found, at, strict=True)
         ]
         return list(zip(found, calls, strict=True))
@@ -219,9 +225,8 @@ class PlantWriter:
             for term in self.plant.on("output", row):
                 assert isinstance(term.effect, OutputEffect)
                 at, cells, dt = self.plant.part_of(term).start, self.memory[term], self.plant.dt
-                lines.append(
-                    f"    y[{output}] = {term.effect.name}(y[{output}], {self.of_theta}, {at}, s, {cells}, {dt!r}, k)"
-                )
+                given = f"y[{output}], {self.of_theta}, {at}, s, {cells}, {dt!r}, k"
+                lines.append(f"    y[{output}] = {law_name(term.effect)}({given})")
         return lines
 
     def _follow(self) -> str:

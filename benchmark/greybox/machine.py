@@ -12,8 +12,9 @@ from jaxtyping import Float
 
 from simgap.greybox.effects.effect import Parameter
 from simgap.greybox.terms import Term
-from simgap.known_plant import ANGLES, Known, KnownPlant
+from simgap.known_plant import Known, KnownPlant
 from simgap.records import Channels
+from simgap.units import of_motion
 
 # The numbers of a machine in theta, in this order; the gain of the drive follows them.
 NAMES = ("inertia", "damping", "back_emf", "mass", "arm", "derivative", "stiffness")
@@ -173,4 +174,5 @@ def machine_of(channels: Channels, u: Float[np.ndarray, "E T nu"]) -> Machine:
 
 
 def _is_angle(channels: Channels) -> bool:
-    return channels.outputs[0].unit.removesuffix("/s") in (*ANGLES, "tick", "ticks")
+    unit = channels.outputs[0].unit
+    return unit in ("tick", "ticks") or of_motion(unit).kind == "angle"

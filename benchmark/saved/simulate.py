@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.data.formats.units import plain
 from simgap.data.loading import read_recordings
 from simgap.metrics import score_outputs
 from simgap.records import Channel, Channels, Experiment, UnusableInput, same_sampling_time
 from simgap.running.fitting import CheckedSimulation
 from simgap.saved.archive import FittedOn, SavedModel, read_saved
+from simgap.units import plain
 
 
 @dataclass(frozen=True, eq=False)

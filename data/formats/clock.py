@@ -14,8 +14,8 @@ from jaxtyping import Float, Int64
 
 from simgap.data.formats.headings import time_unit
 from simgap.data.formats.tables import BadCell, Table
-from simgap.data.formats.units import seconds_in
 from simgap.records import UnusableInput
+from simgap.units import seconds_in
 
 DATE = re.compile(r"\s*\d{1,4}[-./:]\d{1,2}[-./:]\d|\s*\d{1,2}:\d\d")
 YEAR_FIRST = re.compile(r"(\d{4})/(\d\d)/(\d\d)")

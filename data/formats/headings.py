@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from reprlib import repr as short
 
-from simgap.data.formats.units import quantity, seconds_in
+from simgap.units import quantity, seconds_in
 
 BRACKETS = re.compile(r"(?P<name>.*?)(?P<gap>[\s_]*)(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
 SLASH = re.compile(r"(?P<name>.*\S)\s+/\s+(?P<unit>\S.*)")

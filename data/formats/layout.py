@@ -6,7 +6,7 @@ import csv
 import re
 from dataclasses import dataclass
 
-from simgap.data.formats.units import quantity
+from simgap.units import quantity
 
 LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n|\Z)")
 SEPARATORS = "\t;,"

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from simgap.known_plant import ANGLES, Known, KnownPlant
+from simgap.known_plant import Known, KnownPlant
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
+from simgap.units import of_motion
 
 KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled", "gravity", "hangs_at",
         "ticks_per_turn", "controller")  # fmt: skip
@@ -73,7 +74,7 @@ def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
     goal_unit = channels.inputs[inputs.index(drive)].unit
     factor = 1.0
     if controller is not None and goal_unit != output.unit:
-        if (goal_unit in LENGTHS) != (output.unit in LENGTHS):
+        if (of_motion(goal_unit).kind == "length") != (of_motion(output.unit).kind == "length"):
             raise UnusableInput(f"{where}: the goal is in {goal_unit or '1'}, the output in {output.unit or '1'}; "
                                 "give both a unit of the same quantity")  # fmt: skip
         factor = _scale(goal_unit, table.get("ticks_per_turn"), where) / radian
@@ -236,7 +237,7 @@ def _scale(unit: str, ticks_per_turn: Any, where: str) -> float:
         if ticks <= 0:
             raise UnusableInput(f"{where}: ticks_per_turn is {ticks:g}; it must be positive")
         return TURN / ticks
-    return (ANGLES | LENGTHS).get(unit.removesuffix("/s"), 1.0)
+    return of_motion(unit).factor
 
 
 def _gravity(value: Any, known: Mapping[str, Known | None], unit: str, where: str) -> float:
@@ -244,7 +245,7 @@ def _gravity(value: Any, known: Mapping[str, Known | None], unit: str, where: st
         return 0.0
     if known["mass"] is None or known["arm"] is None:
         raise UnusableInput(f"{where}: gravity needs mass and arm; without them leave it out, and it is looked for")
-    if unit not in ANGLES and unit not in TICKS:
+    if of_motion(unit).kind != "angle" and unit not in TICKS:
         raise UnusableInput(f"{where}: gravity acts on an angle; the output is in {unit or '1'}, so write its unit")
     return STANDARD_GRAVITY if value is True else _number(value, "gravity", where)
 

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from simgap.neural.training import checkpoints, graph, sequences, stepping, weights, windows
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
-from simgap.neural.training.loop import History, Recipe, figures, range_test, train
+from simgap.neural.training.loop import DECAYED, History, Recipe, figures, range_test, train
 from simgap.neural.training.scaling import Scaling, features, scalings
 from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
@@ -130,7 +130,15 @@ class Network(ABC):
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed)
             net = self.net(self.inputs, ny)
+        self._check_use(net)
         return examples, held_out, net
+
+    def _check_use(self, net: Block) -> None:
+        """Raise UnusableInput for a regularisation that this network has no layer for."""
+        if self.dropout and not any(isinstance(part, torch.nn.Dropout) for part in net.modules()):
+            raise UnusableInput(f"dropout is {self.dropout}; this network has no layer with dropout, so leave it out")
+        if self.l2 and not any(isinstance(part, DECAYED) for part in net.modules()):
+            raise UnusableInput(f"l2 is {self.l2}; this network has no layer that l2 acts on, so leave it out")
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]

@@ -91,4 +91,4 @@ def test_uneven_time_is_put_right_by_the_option_that_the_refusal_names(capsys, m
     assert "2 experiments of one file, cut at 1 gaps" in out
     code, out, _ = run(capsys, "data", "check", motor, *COLUMNS, "--split-gaps", "--resample", "0.02")
     assert code == 0
-    assert "560 rows resampled to 280 samples every 0.02 s, 0 interpolated" in out
+    assert "560 rows resampled to 280 samples every 0.02 s, each the mean over 0.02 s" in out

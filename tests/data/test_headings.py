@@ -6,8 +6,8 @@ import pytest
 
 from simgap.data import load
 from simgap.data.formats.headings import heading_of, time_unit
-from simgap.data.formats.units import quantity, seconds_in
 from simgap.data.kinds import kind_of
+from simgap.units import quantity, seconds_in
 
 ROWS = 50
 
@@ -158,7 +158,7 @@ def test_a_kind_that_cannot_be_is_refused(refused, kind, said):
 
 
 def test_one_kind_for_two_outputs_is_refused(refused):
-    assert "of which output" in refused(frame().assign(z=0.0), ["u"], ["y", "z"], kind="level")
+    assert "of which output" in refused(frame().assign(z=frame().y), ["u"], ["y", "z"], kind="level")
 
 
 def test_the_kind_of_a_registered_data_set_or_a_folder_may_be_said(good):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -35,12 +36,14 @@ def joint_attributes(joint: Joint, step: float) -> dict[str, str]:
     made = {
         "damping": _series(joint.damping, joint.drag),
         "stiffness": _series(joint.stiffness, *joint.stiffness_by_position),
+        "frictionloss": repr(joint.frictionloss),  # of zero, too: the joint of somebody's file may have its own
+        "springref": "0",
     }
     if joint.carried is not None:
         made["armature"] = repr(armature(joint))
     soft = f"{2 * step!r} 1"
     if joint.frictionloss:
-        made |= {"frictionloss": repr(joint.frictionloss), "solimpfriction": STIFF, "solreffriction": soft}
+        made |= {"solimpfriction": STIFF, "solreffriction": soft}
     if joint.limits:
         made |= {"limited": "true", "range": _numbers(*joint.limits), "solimplimit": STIFF, "solreflimit": soft}
     return made
@@ -84,7 +87,7 @@ def write(subject: Subject, folder: Path) -> None:
     gaps, joint = gaps_of(subject, joint_of(subject, MJCF, "mjcf"))
     step = joint_runs.timestep(subject, joint)
     root = ET.Element("mujoco", model=subject.name)
-    root.append(ET.Comment(f" {heading(subject).replace('--', '-')} "))
+    root.append(ET.Comment(f" {re.sub('-+', '-', heading(subject))} "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     option = ET.SubElement(
         root, "option", timestep=repr(step), integrator="RK4", gravity=_numbers(0.0, 0.0, -STANDARD_GRAVITY),

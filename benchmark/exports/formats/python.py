@@ -76,5 +76,8 @@ def run_program(command: list[str], record: CheckRecord) -> Float[np.ndarray, "N
     if done.returncode:
         reason = (done.stderr.strip().splitlines() or [f"it ended with {done.returncode}"])[-1]
         raise UnusableInput(f"{command[-1]} does not run: {reason}")
-    rows = [[float(value) for value in line.split()] for line in done.stdout.splitlines()]
-    return np.array(rows).reshape(len(rows), -1)
+    try:
+        rows = [[float(value) for value in line.split()] for line in done.stdout.splitlines()]
+        return np.array(rows).reshape(len(rows), -1)
+    except ValueError as error:
+        raise UnusableInput(f"{command[-1]} prints something else than its outputs: {error}") from error

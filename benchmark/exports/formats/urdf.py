@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def write(subject: Subject, folder: Path) -> None:
     """Write model.urdf and joint.json."""
     joint = _joint(subject)
     root = ET.Element("robot", name=subject.name)
-    root.append(ET.Comment(f" {heading(subject).replace('--', '-')} "))
+    root.append(ET.Comment(f" {re.sub('-+', '-', heading(subject))} "))
     ET.SubElement(root, "link", name="base")
     joint.carried = None  # a URDF has no inertia of a drive, so that the body has all of it
     mass, centre, about_centre = body(joint)

@@ -43,7 +43,7 @@ class CubicStiffness(ForceEffect):
         return (
             Parameter(
                 "stiffness",
-                scales.unit(-2, -scales.order),
+                scales.force_over(x=3),
                 -100 * scales.force_rms / scales.x_max**3,
                 100 * scales.force_rms / scales.x_max**3,
             ),

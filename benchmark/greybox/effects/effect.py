@@ -74,6 +74,19 @@ class SignalScales:
             return self.y_unit
         return self.unit(1, -1 if self.kind == "level" else -self.order - (self.kind == "velocity"))
 
+    def force_over(self, x: int = 0, v: int = 0) -> str:
+        """Unit of a force over x powers of the position and v of the velocity, as the force terms see them."""
+        seconds = 0 if self.order == 1 and self.kind == "other" else v  # there the velocity is the output itself
+        if not self.force and self.order:
+            return self.unit(1 - x - v, seconds - self.order - (self.kind == "velocity"))
+        force, moved = self.force or self.y_unit, self.y_unit if self.order else self.u_unit
+        if self.kind == "velocity" and not moved.endswith("/s"):
+            seconds = 0  # rpm, km/h
+        moved = moved.removesuffix("/s")
+        above = " ".join(filter(None, [force, f"s^{seconds}" if seconds > 1 else "s" * seconds])) or "1"
+        below = f"({moved})" if "/" in moved else moved
+        return f"{above}/{below}{f'^{x + v}' if x + v > 1 else ''}" if below else above
+
     @property
     def velocity_unit(self) -> str:
         """Unit of the velocity that the force terms see."""

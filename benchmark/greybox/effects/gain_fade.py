@@ -14,7 +14,7 @@ from simgap.registry import EFFECTS
 @EFFECTS.register("gain_fade")
 @final
 class GainFade(InputEffect):
-    """u' = (1 - r t) u, t since the start of the experiment."""
+    """u' = max(1 - r t, 0) u, t since the start of the experiment."""
 
     name: ClassVar[str] = "gain_fade"
     title: ClassVar[str] = "a gain that fades with time"
@@ -39,10 +39,10 @@ class GainFade(InputEffect):
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """Return u (1 - p[0] t), with t at the middle of each step."""
-        return u * (1 - p[0] * h * (np.arange(u.shape[1]) + 0.5))
+        """Return u max(1 - p[0] t, 0), with t at the middle of each step."""
+        return u * np.maximum(1 - p[0] * h * (np.arange(u.shape[1]) + 0.5), 0.0)
 
     @staticmethod
     def step(u, p, i, m, j, h, k):
         """Return the same, substep by substep."""
-        return u * (1 - p[i] * h * (k + 0.5))
+        return u * max(1 - p[i] * h * (k + 0.5), 0.0)

@@ -8,8 +8,13 @@ from typing import ClassVar, final
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
+from simgap.units import of_motion
 
-RADIANS = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
+
+def _radian(unit: str) -> float:
+    """Give the unit of an angle in rad; 0 for what is none."""
+    motion = of_motion(unit)
+    return motion.factor if motion.kind == "angle" else 0.0
 
 
 @EFFECTS.register("gravity")
@@ -41,8 +46,8 @@ class Gravity(ForceEffect):
 
         A pendulum that swings faster than half the sampling frequency is not seen.
         """
-        turn = 2 * math.pi / RADIANS.get(scales.y_unit, 1.0)
-        radian = RADIANS.get(scales.y_unit, 1.0)
+        radian = _radian(scales.y_unit) or 1.0
+        turn = 2 * math.pi / radian
         return (
             Parameter("amplitude", scales.force_unit, 0.0, (math.pi / scales.dt) ** 2 / radian),
             Parameter("angle at rest", scales.y_unit, -0.5 * turn, 0.5 * turn),
@@ -51,7 +56,7 @@ class Gravity(ForceEffect):
 
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from weak to strong, hanging or standing out at angle zero."""
-        radian = RADIANS.get(scales.y_unit, 1.0)
+        radian = _radian(scales.y_unit) or 1.0
         return [
             Start((level * scales.force_rms, angle / radian, radian))
             for level in (0.7, 3.0)
@@ -60,7 +65,7 @@ class Gravity(ForceEffect):
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is an angle that moves by more than a twelfth of a turn."""
-        return scales.kind == "position" and RADIANS.get(scales.y_unit, 0.0) * scales.x_max > 0.5
+        return scales.kind == "position" and _radian(scales.y_unit) * scales.x_max > 0.5
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

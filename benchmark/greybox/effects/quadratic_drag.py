@@ -34,7 +34,7 @@ class QuadraticDrag(ForceEffect):
         return (
             Parameter(
                 "drag",
-                scales.unit(-1, 0 if scales.order > 1 or scales.kind == "velocity" else -1),
+                scales.force_over(v=2),
                 0.0,
                 100 * scales.force_rms / scales.v_max**2,
             ),

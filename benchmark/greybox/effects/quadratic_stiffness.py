@@ -29,7 +29,7 @@ class QuadraticStiffness(ForceEffect):
         return (
             Parameter(
                 "stiffness",
-                scales.unit(-1, -scales.order),
+                scales.force_over(x=2),
                 -100 * scales.force_rms / scales.x_max**2,
                 100 * scales.force_rms / scales.x_max**2,
             ),

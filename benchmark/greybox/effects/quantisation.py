@@ -42,5 +42,5 @@ class Quantisation(OutputEffect):
 
     @staticmethod
     def step(y, p, i, m, j, h, k):
-        """Return the same, sample by sample."""
-        return p[i] * round(y / p[i])
+        """Return the same, sample by sample; what is no number or grows without bound stays as it is."""
+        return p[i] * round(y / p[i]) if y - y == 0.0 else y

@@ -1,15 +1,21 @@
-"""Units as people write them: whether a text is a unit, what it measures, and how many seconds a unit of time is."""
+"""Units as people write them: whether a text is a unit, what it measures, and what it is in SI."""
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal, NamedTuple
 
 # What one symbol measures; those of a single letter and those of SI prefixes are told apart by capitals.
-ANGLES = {"rad", "deg", "degree", "degrees", "°", "rev", "revs", "turn", "turns", "arcmin", "arcsec"}
-LENGTHS = {"m", "inch", "inches", "in", "ft"}
+DEGREE, TURN = math.pi / 180, 2 * math.pi
+ANGLES = {
+    "rad": 1.0, "deg": DEGREE, "degree": DEGREE, "degrees": DEGREE, "°": DEGREE, "rev": TURN, "revs": TURN,
+    "turn": TURN, "turns": TURN, "arcmin": DEGREE / 60, "arcsec": DEGREE / 3600,
+}  # fmt: skip  # in rad
+LENGTHS = {"m": 1.0, "inch": 0.0254, "inches": 0.0254, "in": 0.0254, "ft": 0.3048}  # in m
 TIMES = {
     "s": (1, 1), "sec": (1, 1), "secs": (1, 1), "second": (1, 1), "seconds": (1, 1),
     "ms": (1, 10**3), "msec": (1, 10**3), "milliseconds": (1, 10**3),
@@ -23,10 +29,10 @@ OTHERS = {
 }  # fmt: skip
 LABELS = {"-", "1", "tick", "ticks", "count", "counts", "pulses", "steps", "lsb", "bit", "bits", "raw", "a.u.", "au"}
 ROTATIONS = {"rpm", "r/min", "u/min", "rev/min"}
-SPEEDS = {"kmh", "kph", "mph"}
+SPEEDS = {"kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704}  # in m/s
 PREFIXED = {"m", "rad", "V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "F",
             "C", "mol", "VA", "Wh", "Ah"}  # fmt: skip
-PREFIXES = "GMkhdcmunp"
+PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 0.1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 FACTOR = re.compile(r"([^\d\^\-+]*[^\d\^\-+.]|[-1](?!.))(?:\^?([-+]?\d))?")
 
 
@@ -62,6 +68,36 @@ def quantity(unit: str) -> Quantity | None:
             total[what] += sign * int(match[2] or 1)
             total["other"] += what == "other"
     return Quantity(total["angle"], total["length"], total["time"], total["other"] != 0, total["label"] != 0)
+
+
+class Motion(NamedTuple):
+    """What a unit of a position or a velocity measures, and what it is in rad or m (per second)."""
+
+    kind: Literal["angle", "length", ""]
+    factor: float
+
+
+def of_motion(unit: str) -> Motion:
+    """Tell what a unit of a motion is: "mm" -> ("length", 0.001), "rpm" -> ("angle", 0.10472), "V" -> ("", 1)."""
+    text = re.sub(r"\*s\^?-1$", "/s", plain(unit))
+    if text.lower() in ROTATIONS:
+        return Motion("angle", TURN / 60)
+    if text.lower() in SPEEDS:
+        return Motion("length", SPEEDS[text.lower()])
+    moved, _, per = text.partition("/")
+    times, parts = TIMES.get(_word("s" if per == "S" else per), (0, 1)) if per else (1, 1)
+    kind, factor = _moved(_word(moved))
+    return Motion(kind, factor * parts / times) if kind and times else Motion("", 1.0)
+
+
+def _moved(symbol: str) -> Motion:
+    if symbol in ANGLES:
+        return Motion("angle", ANGLES[symbol])
+    if symbol in LENGTHS:
+        return Motion("length", LENGTHS[symbol])
+    if symbol[:1] in PREFIXES and symbol[1:] in ("m", "rad"):
+        return Motion("length" if symbol[1:] == "m" else "angle", PREFIXES[symbol[0]])
+    return Motion("", 1.0)
 
 
 def seconds_in(unit: str) -> tuple[int, int] | None:
