@@ -7,7 +7,7 @@ import pytest
 from simgap.data import load
 from simgap.data.formats.headings import heading_of, time_unit
 from simgap.data.kinds import kind_of
-from simgap.units import quantity, seconds_in
+from simgap.units import of_motion, quantity, seconds_in
 
 ROWS = 50
 
@@ -166,3 +166,16 @@ def test_the_kind_of_a_registered_data_set_or_a_folder_may_be_said(good):
     assert data.channels.outputs[0].kind_from == "option"
     assert data.training.channels == data.channels
     assert data.sha256 == load(good).sha256
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "factor"),
+    [
+        ("mm", "length", 1e-3), ("µm", "length", 1e-6), ("inch", "length", 0.0254), ("km/h", "length", 1 / 3.6),
+        ("mm/min", "length", 1e-3 / 60), ("m·s⁻¹", "length", 1.0), ("rad/s", "angle", 1.0), ("mrad", "angle", 1e-3),
+        ("Degrees", "angle", np.pi / 180), ("°/s", "angle", np.pi / 180), ("rpm", "angle", np.pi / 30),
+        ("rev/min", "angle", np.pi / 30), ("V", "", 1.0), ("", "", 1.0), ("ticks", "", 1.0), ("m/V", "", 1.0),
+    ],
+)  # fmt: skip
+def test_a_unit_of_a_motion_says_what_it_is_in_si(unit, kind, factor):
+    assert of_motion(unit) == (kind, pytest.approx(factor))

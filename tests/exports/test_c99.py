@@ -39,6 +39,10 @@ def test_c_computes_what_python_does(tmp_path):
     assert [float(line) for line in done.stdout.split()] == [names["law"](x, n, p) for x, n in arguments]
 
 
+def test_a_count_of_samples_may_be_larger_than_an_int():
+    assert "long long n" in translate(SOURCE, ["P"])
+
+
 @pytest.mark.parametrize(
     "line", ["while x > 0.0: x = x - 1.0", "y = [v for v in p]", "y = open('f')", "y = x ** 2.0", "import os", "y = z"]
 )

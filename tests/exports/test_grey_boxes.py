@@ -1,6 +1,7 @@
 """The step of a grey box repeats the compiled simulation: every effect, every kind of plant, in Python and in C."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,3 +118,13 @@ def test_an_output_that_needs_the_next_sample_is_refused():
              "usual": None}  # fmt: skip
     with pytest.raises(UnusableInput, match="sample after the present one"):
         GreyBoxStep(GreyBoxModel([FittedPlant.from_saved(state)]), 1, 1)
+
+
+def test_a_law_and_its_finer_form_in_one_model_do_not_take_each_others_name():
+    coarse = EFFECTS["curved_input"]()
+    fine = coarse.refined()
+    plants = [grey_box("velocity", [one], [values_of(one, scales("velocity", 1))[-1]]).plants[0]
+              for one in (coarse, fine)]  # fmt: skip
+    model = GreyBoxModel([plants[0], replace(plants[1], outputs=(1,))])
+    u, y_init = record("velocity")
+    assert differs(model, u, np.column_stack((y_init, y_init))) < 1e-9

@@ -142,6 +142,7 @@ def test_the_learning_rate_range_test_ends_where_the_loss_explodes(data):
         ({"learning_rate": float("nan")}, "learning_rate is nan; give a number from 0"),
         ({"l2": float("inf")}, "l2 is inf; give a number from 0"),
         ({"dropout": 1.0}, "dropout is 1.0; give a share from 0 to below 1"),
+        ({"dropout": 0.2}, "this network has no layer with dropout"),
         ({"units": 0}, "units is 0; a network needs at least 1"),
         ({"window": 500}, "longer than the window of 500 samples"),
     ],
