@@ -22,7 +22,7 @@ def run(
     models: Annotated[str | None, typer.Option(help="Only these models: a,b.")] = None,
     model: Annotated[list[str] | None, typer.Option(help="path/to/file.py:Class; repeatable.")] = None,
     datasets: Annotated[str | None, typer.Option(help="Only these data sets, names or paths: x,y.")] = None,
-    seeds: Annotated[int | None, typer.Option(min=1, help="Number of seeds.")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Number of seeds.")] = None,
     jobs: Annotated[int, typer.Option(help="Number of jobs at a time on this machine.")] = 1,
     engine: Annotated[str, typer.Option(help="Where the jobs run: local, ray, or one of your own.")] = "local",
     address: Annotated[str | None, typer.Option(help="Address of a Ray cluster.")] = None,
