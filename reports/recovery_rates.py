@@ -46,8 +46,9 @@ def rate_tables(scored: Mapping[str, Any]) -> list[Table]:
         for effect, (_, total) in counts["by_effect"].items()
     ]
     of_right = [
-        f"Cases with one effect: {counts['first_right'][1]}; with two: {counts['both_of_pair'][1]}. In brackets: the "
-        "95 % interval (Wilson 1927). A case that a tool fails on counts as not right.",
+        f"Seed {scored['seed']}: cases with one effect {counts['first_right'][1]}, with two "
+        f"{counts['both_of_pair'][1]}. In brackets: the 95 % interval (Wilson 1927). A case that a tool fails on "
+        "counts as not right.",
         "A tool may give several names as one cause, among which it does not decide; the first is its first name, and "
         "the last column says how many names its first causes hold.",
     ]
