@@ -62,8 +62,7 @@ class GreyBox(GreyBoxModel):
 def _check_that_it_acts(term: Term, plant: Plant) -> None:
     """Raise UnusableInput for an effect that changes nothing on such a plant, or has nowhere to begin."""
     assert plant.scales is not None
-    scales = plant.scales.of(term)
-    if not term.effect.applies_to(scales) or not term.effect.starts(scales):
+    if not term.effect.suits(plant.scales.of(term)):
         what = {"other": "an output of no known kind"}.get(plant.kind, f"a {plant.kind}")
         raise UnusableInput(f"{term.effect.name} does not act on {what} of order {plant.order} in these records; "
                             "leave it out, or say with kind what the output is")  # fmt: skip

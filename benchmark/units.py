@@ -30,7 +30,7 @@ OTHERS = {
 LABELS = {"-", "1", "tick", "ticks", "count", "counts", "pulses", "steps", "lsb", "bit", "bits", "raw", "a.u.", "au"}
 ROTATIONS = {"rpm", "r/min", "u/min", "rev/min"}
 SPEEDS = {"kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704}  # in m/s
-PREFIXED = {"m", "rad", "V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "F",
+PREFIXED = {"V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "F",
             "C", "mol", "VA", "Wh", "Ah"}  # fmt: skip
 PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 0.1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
 FACTOR = re.compile(r"([^\d\^\-+]*[^\d\^\-+.]|[-1](?!.))(?:\^?([-+]?\d))?")
@@ -118,15 +118,14 @@ def plain(unit: str) -> str:
 def _measures(symbol: str) -> str | None:
     """Name what one symbol measures, without its exponent."""
     symbol = _word(symbol)
-    for what, symbols in (("angle", ANGLES), ("length", LENGTHS), ("time", TIMES), ("other", OTHERS)):
+    if moved := _moved(symbol).kind:
+        return moved
+    for what, symbols in (("time", TIMES), ("other", OTHERS)):
         if symbol in symbols:
             return what
     if symbol.lower() in LABELS:
         return "label"
-    base = symbol[1:]
-    if symbol[0] in PREFIXES and base in PREFIXED:
-        return {"m": "length", "rad": "angle"}.get(base, "other")
-    return None
+    return "other" if symbol[0] in PREFIXES and symbol[1:] in PREFIXED else None
 
 
 def _word(symbol: str) -> str:

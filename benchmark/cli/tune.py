@@ -41,7 +41,7 @@ def tune(
     param: Annotated[list[str] | None, typer.Option(help="name=value that stays; repeatable.")] = None,
     seconds: Annotated[float, typer.Option(help="Time for all fits; the one under way is finished.")] = 600.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the fits.")] = 0,
-    seeds: Annotated[int, typer.Option(min=1, help="Fits of each setting, of which the median counts.")] = 1,
+    seeds: Annotated[int, typer.Option(help="Fits of each setting, of which the median counts.")] = 1,
     out: Annotated[Path, typer.Option(help="Write the best settings into this file, a suite for `simgap run`.")] = Path(
         "tuned.toml"
     ),

@@ -84,9 +84,13 @@ def _merge(
         edges = np.delete(edges, small - 1 if into_left else small)
 
 
+def _verb(unit: str) -> str:
+    return "turning" if of_motion(unit).kind == "angle" else "moving"
+
+
 def bin_direction(v: Float[np.ndarray, " N"], unit: str) -> Bins | None:
     """Sort samples by the sign of the velocity: back, forwards, and at rest if enough samples are."""
-    verb = "turning" if of_motion(unit).kind == "angle" else "moving"
+    verb = _verb(unit)
     label, words = direction(v) + 1, (f"when {verb} back", "at rest", f"when {verb} forwards")
     count = np.bincount(label, minlength=3)
     least = min(LEAST, len(v) // 4)
@@ -104,7 +108,7 @@ def bin_reversals(v: Float[np.ndarray, " N"], lengths: Sequence[int], dt: float,
     The error of backlash changes its sign from one reversal to the next, so that it would cancel without the direction.
     Centres are in s, negative for motion back.
     """
-    verb = "turning" if of_motion(unit).kind == "angle" else "moving"
+    verb = _verb(unit)
     since, signs = by_experiment(lambda part: since_reversal(part) * dt, v, lengths), np.sign(direction(v))
     labels = np.full(len(v), -1)
     centres: list[float] = []

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 
 from simgap.error_views.correlation import correlation_time
 from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
@@ -20,7 +19,6 @@ from simgap.greybox.identification import Identified
 from simgap.greybox.intervals import intervals
 from simgap.greybox.outliers import Outliers
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records
 from simgap.greybox.selection import Selection
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, significant
@@ -166,7 +164,7 @@ class Evidence:
         plant, (low, high) = estimate.plant, self._intervals
         parameters = plant.parameters_of(term)
         if term in plant.per_experiment:
-            sizes = _sizes_of_own(term, estimate.local[:, plant.own_part_of(term)], self.identified.plant.records)
+            sizes = self.identified.plant.sizes_of_own(term)
             spread, smallest, largest = np.sqrt(np.mean(sizes**2)), np.min(sizes), np.max(sizes)
             name = f"{parameters[0].name}, rms over experiments"
             return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
@@ -232,15 +230,6 @@ class Evidence:
             values, deviance = zip(*sorted(points), strict=True)
             profiles.append(Profile(parameter.name, parameter.unit, values, deviance))
         return tuple(profiles)
-
-
-def _sizes_of_own(term: Term, own: Float[np.ndarray, "E o"], records: Records) -> Float[np.ndarray, " E"]:
-    """Measure what is estimated anew in every experiment: the rms of a load over each record, else its size."""
-    if term.effect.port != "force":
-        return np.linalg.norm(own, axis=1)
-    middles, measured = records.dt * (np.arange(records.mask.shape[1]) + 0.5), records.mask
-    load = own @ term.effect.shapes(middles, records.duration)  # [E, T]
-    return np.sqrt(np.sum(load**2 * measured, axis=1) / np.maximum(measured.sum(axis=1), 1))
 
 
 def gained(smaller: Trial, larger: Trial) -> float:

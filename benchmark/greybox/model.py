@@ -172,6 +172,16 @@ class FittedPlant:
             local, errors = attempt, left
         return problem.simulator.run(theta, local)[0, n_init:]
 
+    def sizes_of_own(self, term: Term) -> Float[np.ndarray, " E"]:
+        """Measure what a term has anew in every training experiment: the rms of a load over it, else its number."""
+        plant, measured = self.estimate.plant, self.records.mask
+        own = self.estimate.local[:, plant.own_part_of(term)]
+        if term.effect.port != "force":
+            return np.linalg.norm(own, axis=1)
+        middles = self.records.dt * (np.arange(measured.shape[1]) + 0.5)
+        load = own @ term.effect.shapes(middles, self.records.duration)  # [E, T]
+        return np.sqrt(np.sum(load**2 * measured, axis=1) / np.maximum(measured.sum(axis=1), 1))
+
     def log_likelihood(self) -> float:
         """Compute the log-likelihood of the errors as white noise, up to a constant."""
         e = self.estimate.errors[self.records.mask]
@@ -220,10 +230,7 @@ class GreyBoxModel:
     @property
     def own_numbers(self) -> tuple[int, ...]:
         """Numbers that `simulate_anew` fits to an experiment, of each output."""
-        of_output = {
-            output: plant.estimate.plant.n_local - plant.estimate.plant.n_start
-            for plant in self.plants for output in plant.outputs
-        }  # fmt: skip
+        of_output = {output: plant.estimate.plant.n_own for plant in self.plants for output in plant.outputs}
         return tuple(of_output[output] for output in sorted(of_output))
 
     @property

@@ -190,7 +190,12 @@ class Plant:
     @property
     def n_local(self) -> int:
         """Numbers estimated in every experiment: the initial state, then those of its own terms."""
-        return self.n_start + sum(term.effect.own for term in self.per_experiment)
+        return self.n_start + self.n_own
+
+    @property
+    def n_own(self) -> int:
+        """Numbers of an experiment that belong to its own terms."""
+        return sum(term.effect.own for term in self.per_experiment)
 
     def own_part_of(self, term: Term) -> slice:
         """Return where the numbers of a per-experiment term stand among those of an experiment."""

@@ -37,7 +37,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
         on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]
         listed += [
             t for t in on_channels
-            if t.key not in taken and effect.applies_to(scales.of(t)) and effect.starts(scales.of(t))
+            if t.key not in taken and effect.suits(scales.of(t))
             and _has_room(t, terms)
         ]  # fmt: skip
     return listed

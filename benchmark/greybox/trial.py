@@ -77,14 +77,13 @@ class Trial:
 def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
     """Score a fitted model on training and on held-out data, under autoregressive noise of the given order."""
     plant, valid = estimate.plant, baseline.valid
-    own = plant.n_local - plant.n_start  # numbers of single experiments
     problem = Problem(plant, valid, baseline.noise)
     on_valid = on_other_records(problem, estimate.theta)
     return Trial(
         plant.terms, estimate, baseline.train,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
-        int(plant.free.sum()), len(baseline.train.u) * own, len(valid.u) * own,
+        int(plant.free.sum()), len(baseline.train.u) * plant.n_own, len(valid.u) * plant.n_own,
         explained_by_past(estimate.errors, baseline.train.mask),
         squares_of_blocks(problem, on_valid.errors),
     )  # fmt: skip

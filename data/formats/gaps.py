@@ -138,6 +138,8 @@ def _on_grid(
 
     between = make_interp_spline(t, values, k=1)
     on_grid = between(grid)
+    if not width:
+        return on_grid
     half = np.minimum(width / 2, np.minimum(grid - t[0], t[-1] - grid))  # shorter at both ends, and symmetric there too
     wide = half > ON_THE_GRID * width
     area, half = between.antiderivative(), half[wide]

@@ -13,7 +13,7 @@ import numpy as np
 
 from simgap.known_plant import Known, KnownPlant
 from simgap.records import Channels, Dataset, Experiment, UnusableInput
-from simgap.units import of_motion
+from simgap.units import TURN, of_motion
 
 KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled", "gravity", "hangs_at",
         "ticks_per_turn", "controller")  # fmt: skip
@@ -21,13 +21,11 @@ CONTROLLER_KEYS = ("goal", "gain", "derivative")
 INTERVAL_KEYS = ("value", "low", "high")
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
 STANDARD_GRAVITY = 9.80665
-TURN = 2 * math.pi
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
 TICKS = ("tick", "ticks", "count", "counts")
 # What a unit is worth in SI. A quantity without a unit is in SI already.
 UNITS = {
     "mass": {"kg": 1.0, "g": 1e-3, "lb": 0.45359237},
-    "arm": LENGTHS,
+    "arm": {unit: of_motion(unit).factor for unit in ("m", "cm", "mm", "in", "ft")},
     "inertia": {"kgm2": 1.0, "gm2": 1e-3, "kgcm2": 1e-4, "gcm2": 1e-7, "kg": 1.0, "g": 1e-3, "m2": 1.0, "cm2": 1e-4},
     "damping": {"Nms/rad": 1.0, "Nms": 1.0, "Ns/m": 1.0, "m2/s": 1.0},
     "supply": {"V": 1.0, "mV": 1e-3, "%": 1e-2, "duty": 1.0},

@@ -196,6 +196,10 @@ class Effect(ABC):
         """Tell whether the effect makes sense on such a plant."""
         return True
 
+    def suits(self, scales: SignalScales) -> bool:
+        """Tell whether it makes sense on such a plant and has where to begin."""
+        return self.applies_to(scales) and bool(self.starts(scales))
+
     def as_refined(self, values: np.ndarray) -> np.ndarray | None:
         """Return its numbers as those of the refined law, where that contains it."""
         return None
