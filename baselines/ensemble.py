@@ -80,6 +80,11 @@ class Ensemble:
         return sum(int(getattr(member, "n_params", 0) or 0) for member in self.members)
 
     @property
+    def earlier_seconds(self) -> float:
+        """Those of the member whose fit was interrupted."""
+        return sum(float(getattr(member, "earlier_seconds", 0.0)) for member in self.members)
+
+    @property
     def fitted(self) -> dict[str, Any]:
         """The weight of each member, in the order of their fits."""
         return {"weights": self.weights.tolist()}

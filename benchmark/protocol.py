@@ -16,12 +16,13 @@ class Model(Protocol):
     """A model of a machine, fitted to measured data and simulated without them.
 
     Hyper-parameters are the fields of a dataclass; `fit` starts from nothing each time it is called.
-    Six attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
+    Seven attributes are optional after `fit`: `n_params`, how many numbers were estimated; `fitted`, a dict of
     what the fit chose (an order, say) that goes into the results; `summary()`, a text for people; `stochastic`, True
     where another seed gives other numbers, as with a network trained from random weights (default False). It goes
     into the results, and `simgap check` then grants the spread of the seeds instead of a rounding error. `as_chosen()`,
     of a model that estimates on the validation data too: the model before it did, whose error on them is an honest one.
     `held_out_error`, where a few numbers of that model are theirs all the same: its cross-validated error on them.
+    `earlier_seconds`, where a fit carried on from an interrupted one: the seconds of that, which count in the results.
     A fitted model is saved attribute by attribute; `simgap.saved` says what it may declare for that.
     """
 

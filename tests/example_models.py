@@ -42,6 +42,12 @@ class Warns(Mean):
         warnings.warn("badly conditioned", RuntimeWarning, stacklevel=1)
 
 
+class CarriedOn(Mean):
+    """Carries on from a fit that was interrupted after a thousand seconds."""
+
+    earlier_seconds = 1000.0
+
+
 class RaisesInFit(Mean):
     def fit(self, data, seed):
         raise RuntimeError("no luck\ntoday")

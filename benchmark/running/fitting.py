@@ -107,7 +107,7 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         warnings.simplefilter("always")
         start = time.perf_counter()
         model.fit(training, about.seed)
-        seconds = time.perf_counter() - start
+        seconds = time.perf_counter() - start + float(getattr(model, "earlier_seconds", 0.0))
     n_params = getattr(model, "n_params", None)
     return replace(
         about,

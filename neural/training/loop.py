@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -60,6 +60,12 @@ class History:
     valid: list[float] = field(default_factory=list)
     rate: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
+    earlier: float = 0.0  # seconds of an interrupted training that this one carried on
+
+    @property
+    def lists(self) -> dict[str, list[float]]:
+        """What is known of every epoch."""
+        return {"train": self.train, "valid": self.valid, "rate": self.rate, "seconds": self.seconds}
 
     @property
     def best(self) -> int:
@@ -99,8 +105,9 @@ def train(
     order = torch.Generator().manual_seed(seed)
     history = History()
     best = {name: value.clone() for name, value in net.state_dict().items()}
-    state = Checkpoint(checkpoint, net, adam, best, order, {f.name: getattr(history, f.name) for f in fields(history)})
-    state.restore()
+    state = Checkpoint(checkpoint, net, adam, best, order, history.lists)
+    if state.restore():
+        history.earlier = sum(history.seconds)
     while len(history.valid) < recipe.epochs and not _hopeless(history, recipe):
         begin = time.perf_counter()
         net.train()

@@ -66,6 +66,7 @@ class Network(ABC):
     of_y: Scaling = field(init=False, repr=False)
     dt: float = field(init=False, repr=False)
     inputs: int = field(init=False, repr=False)
+    earlier_seconds: float = field(default=0.0, init=False, repr=False)
     fitted: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     @abstractmethod
@@ -99,7 +100,7 @@ class Network(ABC):
             history = train(net, examples, held_out, recipe, seed, self.device, checkpoint, tell)
             scores = figures(net, examples), figures(net, held_out)
             reach = {"reach": windows.reach(net, held_out)} if isinstance(held_out, windows.Windows) else {}
-        self.trained = net
+        self.trained, self.earlier_seconds = net, history.earlier
         self.fitted = {
             "epochs": len(history.valid), "best_epoch": history.best, "train": scores[0], "valid": scores[1],
             "train_loss": history.train, "valid_loss": history.valid,

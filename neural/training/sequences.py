@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from simgap.neural.training.blocks import Block
-from simgap.neural.training.examples import Examples
+from simgap.neural.training.examples import Examples, long_enough
 from simgap.neural.training.scaling import Scaling
 from simgap.records import Experiment, UnusableInput
 
@@ -23,7 +23,8 @@ class Sequences(Examples):
     """Pieces of experiments: n measured samples to find the state, then a free run of up to `free` samples;
     at most `starts` of them, evenly spread.
 
-    Features of sample k are u(k), y(k) and 1 as long as k < n, afterwards u(k), 0 and 0.
+    Features of sample k are u(k), y(k) and 1 as long as k < n, afterwards u(k), 0 and 0. All pieces have one length.
+    Experiments shorter than it are left out, with a warning; so where many are short, the pieces are.
     """
 
     def __init__(
@@ -31,10 +32,8 @@ class Sequences(Examples):
         free: int = FREE, starts: int = STARTS,
     ) -> None:  # fmt: skip
         self.n = n
-        self.length = min(max(len(x) for x in experiments), n + free)
-        usable = [x for x in experiments if len(x) >= self.length]
-        if self.length <= n:
-            raise UnusableInput(f"no experiment is longer than the {n} samples that find the state")
+        self.length = _length([len(x) for x in experiments], n, free)
+        usable = long_enough(experiments, self.length)
         u = np.concatenate([of_u.inside(x.u) for x in usable])
         y = np.concatenate([of_y.inside(x.y) for x in usable])
         signals = torch.from_numpy(np.concatenate((u, y), axis=1).astype(np.float32))
@@ -59,6 +58,15 @@ class Sequences(Examples):
     def answer(self, net: Block, x: Float[Tensor, "B L F"]) -> Float[Tensor, "B K ny"]:
         """Compute the network's outputs for a batch, without the samples that found the state."""
         return net(x)[:, self.n :]
+
+
+def _length(lengths: Sequence[int], n: int, free: int) -> int:
+    """Choose the length of a piece: the one whose free runs are long and leave out few samples."""
+    lengths = [length for length in lengths if length > n]
+    if not lengths:
+        raise UnusableInput(f"no experiment is longer than the {n} samples that find the state")
+    choices = {min(length, n + free) for length in lengths}
+    return max(choices, key=lambda piece: (piece - n) * sum(length - n for length in lengths if length >= piece))
 
 
 def with_start(u: Float[Tensor, "B T nu"], y: Float[Tensor, "B n ny"]) -> Float[Tensor, "B T F"]:

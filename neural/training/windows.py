@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 
 from simgap.neural.training.blocks import Block
-from simgap.neural.training.examples import Examples
+from simgap.neural.training.examples import Examples, long_enough
 from simgap.neural.training.scaling import Scaling, features
 from simgap.records import Experiment, UnusableInput
 
@@ -29,7 +29,7 @@ class Windows(Examples):
         self, experiments: Sequence[Experiment], of_x: Scaling, of_y: Scaling, window: int, time: bool, resident: bool
     ) -> None:
         self.window, self.time, self.of_x, self.of_y = window, time, of_x, of_y
-        self.experiments = [x for x in experiments if len(x) > window]
+        self.experiments = long_enough(experiments, window + 1)
         if not self.experiments:
             raise UnusableInput(f"no experiment is longer than the window of {window} samples; choose a smaller window")
         counts = [len(x) - window for x in self.experiments]

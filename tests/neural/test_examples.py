@@ -29,6 +29,7 @@ def windows(lengths, window, resident=True, time=False):
     return Windows(experiments, of_x, of_y, window, time, resident), of_x, of_y
 
 
+@pytest.mark.filterwarnings("ignore:.* experiments have fewer than")
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(3, 40), min_size=1, max_size=4), st.integers(2, 12))
 def test_a_window_ends_one_sample_before_its_target_in_the_same_experiment(lengths, window):
@@ -83,6 +84,31 @@ def test_a_piece_shows_outputs_only_while_the_state_is_found():
     np.testing.assert_allclose(
         of_y.outside(target.numpy())[:, 0, 0], of_u.outside(features.numpy()[:, 6, :1])[:, 0] + 0.5, atol=1e-4
     )
+
+
+@pytest.mark.parametrize(
+    ("lengths", "piece", "short"),
+    [
+        ([500, 500, 900], 110, 0),  # all are long enough
+        ([100] * 50 + [1000], 100, 0),  # the short ones hold most of the data
+        ([20] * 3 + [1000], 110, 3),  # the long one does
+        ([60, 80], 60, 0),
+        ([8, 80], 80, 1),  # shorter than the start
+    ],
+)
+def test_pieces_are_as_long_as_keeps_most_of_the_data_and_what_is_left_out_is_said(lengths, piece, short, recwarn):
+    experiments = [numbered(f"e{i}", 1000 * i, length) for i, length in enumerate(lengths)]
+    of_u, of_y = scalings(experiments, time=False)
+    made = Sequences(experiments, of_u, of_y, n=10, free=100)
+    assert made.length == piece
+    said = [str(w.message) for w in recwarn]
+    assert len(said) == bool(short)
+    assert all(f"{short} of {len(lengths)} experiments have fewer than {piece} samples" in text for text in said)
+
+
+def test_experiments_shorter_than_the_window_are_left_out_with_a_warning():
+    with pytest.warns(UserWarning, match="1 of 2 experiments have fewer than 41 samples"):
+        windows([40, 60], 40)
 
 
 @pytest.mark.parametrize(("samples", "length"), [(2999, 10 + FREE), (3000, 10 + DynoNet.free)])

@@ -19,6 +19,10 @@ def test_fit_takes_what_load_takes(folder, example):
     assert simgap.fit(example("Mean"), folder).results[0].dataset == "noise"
 
 
+def test_the_seconds_of_an_interrupted_fit_count(dataset, example):
+    assert simgap.fit(example("CarriedOn"), dataset).results[0].fit_seconds > 1000
+
+
 def test_fit_raises_what_the_model_raises(dataset, example):
     with pytest.raises(RuntimeError, match="no luck"):
         simgap.fit(example("RaisesInFit"), dataset)
