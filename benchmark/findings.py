@@ -95,11 +95,22 @@ class Trace:
 
 
 @dataclass(frozen=True)
+class InPieces:
+    """The share of a `Gain`, with its 95 % interval, in free runs of so many samples each, one after the other."""
+
+    samples: int
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Gain:
     """Free-run RMSE on the test split per output; share is 1 - after/before over all outputs, with a 95 % interval.
 
     After is the model with the causes or, where they are only suspected, with the suspects; `beats_mean` tells whether
-    it errs less than the mean of the test data would, on some output.
+    it errs less than the mean of the test data would, on some output. In a plant that integrates an error stays, so
+    that a long record is one sample of it: where its free run decides nothing, runs `in_pieces` may.
     """
 
     before: dict[str, float]
@@ -108,15 +119,18 @@ class Gain:
     low: float
     high: float
     beats_mean: bool = True
+    in_pieces: InPieces | None = None
 
     @property
     def shown(self) -> bool:
         """Whether the test data show that the causes help a simulation that is worth having."""
-        return self.low > 0 and self.beats_mean
+        in_pieces = self.in_pieces is not None and self.in_pieces.low > 0 and self.share > 0
+        return (self.low > 0 or in_pieces) and self.beats_mean
 
     def to_json(self) -> dict[str, Any]:
         """Return the numbers; that a simulation is worse than the mean shows in the verdict."""
-        return {key: value for key, value in vars(self).items() if key != "beats_mean"}
+        numbers = {key: value for key, value in vars(self).items() if key not in ("beats_mean", "in_pieces")}
+        return numbers | ({"in_pieces": vars(self.in_pieces)} if self.in_pieces else {})
 
 
 @dataclass(frozen=True)

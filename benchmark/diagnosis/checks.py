@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from simgap.greybox.samples import PIECE, is_cut
 from simgap.records import Dataset
 from simgap.wording import amount
 
@@ -22,6 +23,11 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
     if len(training.train) == 1:
         sentences.append(
             "There is one training experiment: a drift of the sensor cannot be told from a slow change of the plant."
+        )
+    if is_cut(training.train):
+        sentences.append(
+            f"The training records are long, so causes are looked for in pieces of {PIECE} samples: what depends on "
+            "the time since the start, such as a gain that fades or a periodic disturbance, cannot show."
         )
     for i, channel in enumerate(dataset.channels.outputs):
         y = np.concatenate([x.y[:, i] for x in training.train])

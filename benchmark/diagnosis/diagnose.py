@@ -111,7 +111,7 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
         verdict = "unexplained"
     elif found and not doubt:
         stage("Measuring the gain on the test experiments")
-        promised = promises.promise(trusted, dataset, before, profiles)
+        promised = promises.promise(trusted, dataset, plain, before, profiles)
         verdict = "named" if promised.causes else "suspected"
     if verdict == "nothing_found":
         doubt = doubt or unsaid_kinds.undecided(identified, dataset.channels)

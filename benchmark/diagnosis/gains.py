@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from simgap.error_views.correlation import correlation_time
 from simgap.error_views.gain_interval import share_with_interval
-from simgap.findings import Gain
+from simgap.findings import Gain, InPieces
 from simgap.greybox.model import GreyBoxModel
-from simgap.greybox.samples import sizes_of
+from simgap.greybox.samples import PIECE, sizes_of
 from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset, Experiment
 
@@ -56,6 +57,20 @@ def measure(
     names = [channel.name for channel in dataset.channels.outputs]
     rmse_before, rmse_after = (dict(zip(names, map(float, errors), strict=True)) for errors in rmse)
     return Gain(rmse_before, rmse_after, share, low, high, beats_mean)
+
+
+def in_pieces(dataset: Dataset, plain: GreyBoxModel, model: GreyBoxModel) -> InPieces | None:
+    """Compare two models in free runs over pieces as long as those of the search, each from its own start.
+
+    Returns None where no test experiment is that long.
+    """
+    pieces = [x[a : a + PIECE] for x in dataset.test for a in range(0, len(x) - PIECE + 1, PIECE)]
+    if not pieces:
+        return None
+    u, y = np.stack([x.u for x in pieces]), np.stack([x.y for x in pieces])
+    before, after = (list(one.simulate(u, y[:, : dataset.n_init])) for one in (plain, model))
+    gain = measure(replace(dataset, test=tuple(pieces)), before, after)
+    return InPieces(PIECE, gain.share, gain.low, gain.high)
 
 
 def _price(error: Float[np.ndarray, " N"], lengths: np.ndarray, own: int) -> float:

@@ -50,11 +50,13 @@ def rests_on(plant: Evidence) -> Evidence | None:
     return only(plant, plant.terms[:count]) if count or not plant.terms else None
 
 
-def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.ndarray], profiles: bool) -> Promise:
+def promise(
+    evidence: Sequence[Evidence], dataset: Dataset, plain: GreyBoxModel, before: Sequence[np.ndarray], profiles: bool
+) -> Promise:
     """Withdraw effects, the last first, until the test experiments confirm the gain of those that are left.
 
     Where they confirm none, all are suspected. The order was fixed in training; the test data choose no other effect.
-    `before` is the plain model's simulation of the test experiments.
+    `before` is the simulation of the test experiments by the `plain` model.
     """
     listed = [(plant, term) for plant in _in_order(evidence) for term in plant.terms]
     least = 0 if any(plant.selection.baseline.outliers for plant in evidence) else 1
@@ -64,6 +66,8 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
         model = GreyBoxModel([plant.identified.plant for plant in kept])
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
         gain = gains.measure(dataset, before, after, model.own_numbers)
+        if not gain.shown and any(map(_keeps_errors, kept)):
+            gain = replace(gain, in_pieces=gains.in_pieces(dataset, plain, model))
         suspected = suspected or Promise((), found, (), model, after, gain)
         if gain.shown:
             causes = found if count == len(listed) else _causes(kept, profiles)
@@ -72,6 +76,16 @@ def promise(evidence: Sequence[Evidence], dataset: Dataset, before: Sequence[np.
             return Promise(causes, rest, tuple(kept), model, after, gain)
     assert suspected is not None, "there is something to promise"
     return suspected
+
+
+def _keeps_errors(plant: Evidence) -> bool:
+    """Tell whether an error stays in the state for longer than a record, of those that were searched in pieces."""
+    found = plant.identified.plant
+    estimate, of = found.estimate, found.estimate.plant
+    if not plant.selection.baseline.cut or not of.order or of.imposed or of.machine or of.n_own:
+        return False
+    slowest = float(np.min(np.abs(np.linalg.eigvals(of.matrix(estimate.theta)))))
+    return slowest * found.records.duration < 1
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

@@ -18,7 +18,7 @@ from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_from, fit_plain
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts
+from simgap.greybox.samples import Records, excerpts, is_cut
 from simgap.greybox.score_test import candidates
 from simgap.greybox.signal_scales import quantisation_step, scales_of
 from simgap.greybox.subspace_start import linear_models, starts
@@ -54,7 +54,7 @@ def find_baseline(
     check_numbers([*train, *valid], channels)
     records = Records.of(excerpts(train), outputs)
     held_out = Records.of(excerpts(valid), outputs) if valid else records
-    cut = len(records.u) > len(train) or records.mask.shape[1] < max(map(len, train))
+    cut = is_cut(train)
     kind = channels.outputs[outputs[0]].kind
     by_rate = kind == "other" and [channel.kind for channel in channels.inputs] == ["velocity"]
     models, orders = plain_models(records, held_out, kind, n_init, by_rate)

@@ -129,3 +129,9 @@ def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -
     pieces = [x[a : a + PIECE] for x in experiments for a in range(0, max(1, len(x) - PIECE // 2), PIECE)]
     wanted = max(2, samples * len(pieces) // sum(map(len, pieces)))
     return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]
+
+
+def is_cut(experiments: Sequence[Experiment]) -> bool:
+    """Tell whether a search sees pieces of these experiments, and no whole one."""
+    chosen = excerpts(experiments)
+    return len(chosen) > len(experiments) or max(map(len, chosen)) < max(map(len, experiments))

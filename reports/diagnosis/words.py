@@ -12,7 +12,7 @@ from simgap.reports.diagnosis import their_simulation
 from simgap.wording import number, percent
 
 CHANCE = 0.01  # views that chance explains as often are not shown
-WIDE = 1000.0  # %: no interval that says anything
+WIDE = 10.0  # of the error: no interval that says anything
 LAST = "frequency band"  # says where the error is, but nothing about its cause: shown only for want of others
 
 
@@ -179,10 +179,19 @@ def capitalise(text: str) -> str:
 
 
 def _range(findings: Findings) -> str:
-    low, high = sorted(math.copysign(100, findings.gain.share) * end for end in (findings.gain.low, findings.gain.high))
+    gain = findings.gain
+    pieces = gain.in_pieces
+    if pieces is not None and gain.shown:
+        percents = _in_percent(pieces.low, pieces.high)
+        return f", and by {percent(pieces.share)}{percents} in free runs of {pieces.samples} samples each"
+    low, high = sorted(math.copysign(1, gain.share) * end for end in (gain.low, gain.high))
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
     if high - low > WIDE:
         return ", in too few independent samples for an interval"
-    places = 0 if high - low > 2 else 1
-    return f" ({low:.{places}f} to {high:.{places}f} %)"
+    return _in_percent(low, high)
+
+
+def _in_percent(low: float, high: float) -> str:
+    places = 0 if high - low > 0.02 else 1
+    return f" ({100 * low:.{places}f} to {100 * high:.{places}f} %)"

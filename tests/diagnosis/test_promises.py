@@ -39,7 +39,7 @@ def promised(two_effects, identified, monkeypatch):
         monkeypatch.setattr(promises.gains, "measure", measure)
         plain = GreyBoxModel([one.plain for one in identified])
         before = [gains.free_run(plain, x, two_effects.n_init) for x in two_effects.test]
-        return promise([Evidence(one, two_effects.channels) for one in identified], two_effects, before, False)
+        return promise([Evidence(one, two_effects.channels) for one in identified], two_effects, plain, before, False)
 
     return promised
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from simgap.findings import Budget, Value
+from simgap.findings import Budget, InPieces, Value
 from simgap.reports.diagnosis.numbers import interval, numbers
 from simgap.reports.diagnosis.text import diagnosis_text
 
@@ -132,6 +132,18 @@ def test_an_interval_that_says_nothing_is_said_to_say_nothing(suspected):
     assert "falls by 11 %, in too few independent samples for an interval." in in_one_line(
         diagnosis_text(replace(suspected, gain=wide))
     )
+
+
+def test_a_gain_that_only_pieces_of_the_test_records_show_is_said_of_both(named):
+    pieces = InPieces(500, 0.93, 0.912, 0.941)
+    kept = replace(named.gain, share=0.9, low=-40.0, high=0.99, in_pieces=pieces)
+    assert kept.shown
+    assert "falls by 90 %, and by 93 % (91 to 94 %) in free runs of 500 samples each." in in_one_line(
+        diagnosis_text(replace(named, gain=kept))
+    )
+    assert kept.to_json()["in_pieces"] == {"samples": 500, "share": 0.93, "low": 0.912, "high": 0.941}
+    assert not replace(kept, share=-0.1).shown
+    assert not replace(kept, in_pieces=replace(pieces, low=-0.1)).shown
 
 
 def test_an_offer_is_called_an_offer(unexplained):

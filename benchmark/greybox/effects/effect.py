@@ -153,6 +153,8 @@ class Effect(ABC):
     # So many numbers are estimated anew in every experiment: it adds each times one of its `shapes` to the reading, or
     # to the forces.
     own: ClassVar[int] = 0
+    # It depends on the time since the start of the experiment, which pieces of a long record do not know.
+    of_time: ClassVar[bool] = False
     # False when it cannot be simulated and is found in the errors instead.
     simulated: ClassVar[bool] = True
     # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.

@@ -24,6 +24,7 @@ class GainFade(InputEffect):
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
     place_in_chain: ClassVar[int] = 20
+    of_time: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record at rest without input: a drift is still there, a fading gain has nothing to act on",

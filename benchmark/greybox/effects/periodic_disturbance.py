@@ -25,6 +25,7 @@ class PeriodicDisturbance(ForceEffect):
         "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"
     )
     role: ClassVar[Role] = "force"
+    of_time: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("frequency band", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "position_torque": (
