@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 MAX_ORDER = 3
+SINGULAR = 1e-13  # of the largest singular value of a matrix of products: below it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +49,23 @@ def white_as_large_as(
 
 
 def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], order: int) -> Noise:
-    """Estimate the noise that errors e would be, by the Yule-Walker equations (Ljung 1999, section 4.2)."""
-    ny = e.shape[2]
+    """Estimate the noise that errors e would be, by least squares (Ljung 1999, section 4.2).
+
+    The Yule-Walker equations would take errors beyond a record for zero. Where a plant integrates, errors are large at
+    its end: the noise would seem to have jumps, and whatever makes the errors smaller, a cause.
+    """
+    ny, samples = e.shape[2], e.shape[1]
     polynomials, deviations = np.zeros((ny, order + 1)), np.ones(ny)
     polynomials[:, 0] = 1.0
+    lags = [slice(order - lag, max(samples - lag, order - lag)) for lag in range(order + 1)]
+    known = np.logical_and.reduce([mask[:, lag] for lag in lags])
     for j in range(ny):
-        x = np.where(mask, e[:, :, j], 0.0)
-        lags = np.array([np.sum(x[:, lag:] * x[:, : x.shape[1] - lag]) for lag in range(order + 1)])
-        if order and 0 < lags[0] < np.inf:
-            polynomials[j, 1:] = -solve_toeplitz(lags[:-1] * (1 + 1e-9 * (np.arange(order) == 0)), lags[1:])
-        if lags[0]:  # noise that its past explains altogether is still noise; errors of zero have any deviation
-            deviations[j] = np.sqrt(max(polynomials[j] @ lags, 1e-12 * lags[0]) / mask.sum())
+        lagged = np.array([e[:, lag, j][known] for lag in lags])  # [1 + order, N]
+        products = lagged @ lagged.T / max(1, lagged.shape[1])
+        if order and 0 < products[0, 0] and np.isfinite(products).all():
+            polynomials[j, 1:] = -np.linalg.lstsq(products[1:, 1:], products[1:, 0], rcond=SINGULAR)[0]
+        if total := products[0, 0]:  # noise that its past explains altogether is still noise; none has any deviation
+            deviations[j] = np.sqrt(max(polynomials[j] @ products @ polynomials[j], 1e-12 * total))
     return Noise(polynomials, deviations)
 
 

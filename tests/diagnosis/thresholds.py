@@ -33,6 +33,7 @@ THRESHOLDS = (
     ("simgap.greybox.trial", "MATTERS_AT_ALL"),
     ("simgap.greybox.trial", "OF_MEMORY"),
     ("simgap.greybox.trial", "HALVES_LEAVE"),
+    ("simgap.greybox.trial", "PIECES_LEAVE"),
     ("simgap.greybox.trial", "ALIKE"),
     ("simgap.greybox.trial", "WORST"),
     ("simgap.greybox.selection", "BETTER"),

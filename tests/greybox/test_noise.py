@@ -33,6 +33,13 @@ def test_the_coefficients_of_second_order_noise_are_found_for_each_output():
     np.testing.assert_allclose(deviations, [1.0, 0.2], rtol=4 / np.sqrt(2 * EVERYWHERE.size))
 
 
+def test_noise_that_a_plant_integrates_keeps_its_size_though_records_end_far_from_zero():
+    e = np.cumsum(np.cumsum(np.random.default_rng(4).standard_normal((10, 500)), axis=1), axis=1)
+    polynomials, deviations = estimated_noise(e[:, :, None], np.ones(e.shape, dtype=bool), 2)
+    np.testing.assert_allclose(polynomials[0], [1.0, -2.0, 1.0], atol=1e-2)
+    assert deviations[0] == pytest.approx(1.0, rel=4 / np.sqrt(2 * e.size))
+
+
 def test_whitened_noise_is_the_white_noise_that_it_was_made_of_with_unit_variance():
     e, w = coloured(np.random.default_rng(2), (3, 400), AR2, deviation=0.7)
     white = whitened(noise_of([[1.0, -1.2, 0.5]], [0.7]), e[:, :, None])
