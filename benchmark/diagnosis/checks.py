@@ -24,10 +24,10 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
         sentences.append(
             "There is one training experiment: a drift of the sensor cannot be told from a slow change of the plant."
         )
-    if is_cut(training.train):
+    if dataset.channels.plant is None and is_cut(training.train):
         sentences.append(
-            f"The training records are long, so causes are looked for in pieces of {PIECE} samples: what depends on "
-            "the time since the start, such as a gain that fades or a periodic disturbance, cannot show."
+            f"There are many training samples, so causes are looked for in pieces of {PIECE}: what depends on the time "
+            "since the start, such as a gain that fades or a periodic disturbance, cannot show."
         )
     for i, channel in enumerate(dataset.channels.outputs):
         y = np.concatenate([x.y[:, i] for x in training.train])

@@ -80,12 +80,11 @@ def promise(
 
 def _keeps_errors(plant: Evidence) -> bool:
     """Tell whether an error stays in the state for longer than a record, of those that were searched in pieces."""
-    found = plant.identified.plant
-    estimate, of = found.estimate, found.estimate.plant
-    if not plant.selection.baseline.cut or not of.order or of.imposed or of.machine or of.n_own:
+    fitted = plant.identified.plant
+    body = fitted.estimate.plant
+    if not plant.selection.baseline.cut or not body.order or body.imposed or body.machine or body.n_own:
         return False
-    slowest = float(np.min(np.abs(np.linalg.eigvals(of.matrix(estimate.theta)))))
-    return slowest * found.records.duration < 1
+    return fitted.estimate.slowest * fitted.records.duration < 1
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

@@ -27,6 +27,11 @@ class Estimate:
     squares: float
     converged: bool
 
+    @property
+    def slowest(self) -> float:
+        """Size of the slowest pole, in 1/s; 0 where the plant integrates."""
+        return float(np.min(np.abs(np.linalg.eigvals(self.plant.matrix(self.theta)))))
+
 
 def descend(
     problem: Problem,

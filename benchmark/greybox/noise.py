@@ -62,7 +62,7 @@ def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], orde
     for j in range(ny):
         lagged = np.array([e[:, lag, j][known] for lag in lags])  # [1 + order, N]
         products = lagged @ lagged.T / max(1, lagged.shape[1])
-        if order and 0 < products[0, 0] and np.isfinite(products).all():
+        if order and products[0, 0] > 0 and np.isfinite(products).all():
             polynomials[j, 1:] = -np.linalg.lstsq(products[1:, 1:], products[1:, 0], rcond=SINGULAR)[0]
         if total := products[0, 0]:  # noise that its past explains altogether is still noise; none has any deviation
             deviations[j] = np.sqrt(max(polynomials[j] @ products @ polynomials[j], 1e-12 * total))
