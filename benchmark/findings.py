@@ -94,6 +94,10 @@ class Trace:
     after: Float[np.ndarray, "N ny"]
 
 
+# Pieces of one record share its slow disturbances. A wrong effect may follow them a little, but not to half the error.
+LARGE_IN_PIECES = 0.5
+
+
 @dataclass(frozen=True)
 class InPieces:
     """The share of a `Gain`, with its 95 % interval, in free runs of so many samples each, one after the other."""
@@ -124,7 +128,7 @@ class Gain:
     @property
     def shown(self) -> bool:
         """Whether the test data show that the causes help a simulation that is worth having."""
-        in_pieces = self.in_pieces is not None and self.in_pieces.low > 0 and self.share > 0
+        in_pieces = self.in_pieces is not None and self.in_pieces.low > LARGE_IN_PIECES and self.share > 0
         return (self.low > 0 or in_pieces) and self.beats_mean
 
     def to_json(self) -> dict[str, Any]:

@@ -143,7 +143,7 @@ def test_a_gain_that_only_pieces_of_the_test_records_show_is_said_of_both(named)
     )
     assert kept.to_json()["in_pieces"] == {"samples": 500, "share": 0.93, "low": 0.912, "high": 0.941}
     assert not replace(kept, share=-0.1).shown
-    assert not replace(kept, in_pieces=replace(pieces, low=-0.1)).shown
+    assert not replace(kept, in_pieces=replace(pieces, low=0.4)).shown
 
 
 def test_an_offer_is_called_an_offer(unexplained):
