@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from simgap.protocol import as_chosen, is_stochastic
+from simgap.protocol import as_chosen, earlier_seconds, is_stochastic
 from simgap.records import Experiment, TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -57,6 +57,11 @@ class Delta:
     def stochastic(self) -> bool:
         """Whether the other model is."""
         return is_stochastic(self.inner)
+
+    @property
+    def earlier_seconds(self) -> float:
+        """Those of the model within."""
+        return earlier_seconds(self.inner)
 
     @property
     def n_params(self) -> int | None:

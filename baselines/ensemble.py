@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from simgap.baselines.estimation.stacking import cross_validated, stacked
 from simgap.metrics import free_runs
-from simgap.protocol import as_chosen, is_stochastic
+from simgap.protocol import as_chosen, earlier_seconds, is_stochastic
 from simgap.records import TrainingSet, UnusableInput
 from simgap.registry import MODELS
 
@@ -82,7 +82,7 @@ class Ensemble:
     @property
     def earlier_seconds(self) -> float:
         """Those of the member whose fit was interrupted."""
-        return sum(float(getattr(member, "earlier_seconds", 0.0)) for member in self.members)
+        return sum(map(earlier_seconds, self.members))
 
     @property
     def fitted(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from simgap.baselines.greybox import GreyBox
 from simgap.baselines.greybox_auto import GreyBoxAuto
-from simgap.protocol import as_chosen, is_stochastic
+from simgap.protocol import as_chosen, earlier_seconds, is_stochastic
 from simgap.records import Channel, Channels, Experiment, TrainingSet
 from simgap.registry import MODELS
 
@@ -77,6 +77,11 @@ class Informed:
     def stochastic(self) -> bool:
         """Whether the other model is; the grey box is not."""
         return is_stochastic(self.model)
+
+    @property
+    def earlier_seconds(self) -> float:
+        """Those of the other model."""
+        return earlier_seconds(self.model)
 
     @property
     def n_params(self) -> int:

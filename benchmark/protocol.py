@@ -52,6 +52,11 @@ def is_stochastic(model: Any) -> bool:
     return getattr(model, "stochastic", False) is True
 
 
+def earlier_seconds(model: Any) -> float:
+    """Seconds of an interrupted fit that the last one carried on; 0 for a model that says nothing of them."""
+    return float(getattr(model, "earlier_seconds", 0.0))
+
+
 _listener: Callable[[int, int], None] | None = None
 
 

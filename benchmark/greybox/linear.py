@@ -52,9 +52,10 @@ def find_baseline(
     Held-out records are simulated from their first n_init samples, as the test will be.
     """
     check_numbers([*train, *valid], channels)
-    records = Records.of(excerpts(train), outputs)
+    chosen = excerpts(train)
+    records = Records.of(chosen, outputs)
     held_out = Records.of(excerpts(valid), outputs) if valid else records
-    cut = is_cut(train)
+    cut = is_cut(chosen, train)
     kind = channels.outputs[outputs[0]].kind
     by_rate = kind == "other" and [channel.kind for channel in channels.inputs] == ["velocity"]
     models, orders = plain_models(records, held_out, kind, n_init, by_rate)

@@ -17,7 +17,7 @@ from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.outliers import find_glitches, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts
+from simgap.greybox.samples import Records, excerpts, is_cut
 from simgap.greybox.signal_scales import quantisation_step, scales_of
 from simgap.greybox.terms import PlantScales
 from simgap.records import Channels, Experiment
@@ -59,7 +59,7 @@ def find_machine_baseline(
     records, held_out = replace(records, soft=soft), replace(held_out, soft=soft)
     plain = fit_machine(plant, records, plain)
     plain = replace(plain, plant=replace(plant, scales=machine_scales(plain, records, channels, outputs)))
-    cut = max(map(len, train)) > records.mask.shape[1]
+    cut = is_cut(chosen, train)
     return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers))
 
 

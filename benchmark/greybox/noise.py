@@ -57,7 +57,7 @@ def estimate(e: Float[np.ndarray, "E T ny"], mask: Bool[np.ndarray, "E T"], orde
     ny, samples = e.shape[2], e.shape[1]
     polynomials, deviations = np.zeros((ny, order + 1)), np.ones(ny)
     polynomials[:, 0] = 1.0
-    lags = [slice(order - lag, max(samples - lag, order - lag)) for lag in range(order + 1)]
+    lags = [slice(order - lag, max(samples, order) - lag) for lag in range(order + 1)]
     known = np.logical_and.reduce([mask[:, lag] for lag in lags])
     for j in range(ny):
         lagged = np.array([e[:, lag, j][known] for lag in lags])  # [1 + order, N]

@@ -131,7 +131,6 @@ def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -
     return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]
 
 
-def is_cut(experiments: Sequence[Experiment]) -> bool:
-    """Tell whether a search sees pieces of these experiments, and no whole one."""
-    chosen = excerpts(experiments)
+def is_cut(chosen: Sequence[Experiment], experiments: Sequence[Experiment]) -> bool:
+    """Tell whether what was chosen of these experiments are pieces of them."""
     return len(chosen) > len(experiments) or max(map(len, chosen)) < max(map(len, experiments))

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.metrics import failed_metrics, free_run_nrmse
-from simgap.protocol import Model, as_chosen, is_stochastic
+from simgap.protocol import Model, as_chosen, earlier_seconds, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
 from simgap.registry import MODELS, load_class
 from simgap.results.store import plain
@@ -107,7 +107,7 @@ def fit_model(model: Model, training: TrainingSet, about: Result) -> Result:
         warnings.simplefilter("always")
         start = time.perf_counter()
         model.fit(training, about.seed)
-        seconds = time.perf_counter() - start + float(getattr(model, "earlier_seconds", 0.0))
+        seconds = time.perf_counter() - start + earlier_seconds(model)
     n_params = getattr(model, "n_params", None)
     return replace(
         about,

@@ -35,7 +35,7 @@ def long_enough(experiments: Sequence[Experiment], length: int) -> list[Experime
         short = len(experiments) - len(chosen)
         warnings.warn(
             f"{short} of {len(experiments)} experiments have fewer than {length} samples, as many as the network "
-            "trains on at once, and were left out",
+            "sees at once, and were left out",
             stacklevel=2,
         )
     return chosen

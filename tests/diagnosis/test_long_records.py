@@ -34,8 +34,7 @@ def moves(rng, samples):
 
 def record(rng, samples, friction=0.0, load=0.0):
     """Simulate the axis under its controller: voltage, position by an encoder of 1 um, a load that wanders."""
-    position = speed = seen_speed = wandering = 0.0
-    seen = 0.0
+    position = speed = seen = seen_speed = wandering = 0.0
     u, y = np.empty((samples, 1)), np.empty((samples, 1))
     for k, goal in enumerate(moves(rng, samples)):
         reading = round(position, 6)

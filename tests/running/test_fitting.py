@@ -2,6 +2,7 @@ import pytest
 
 import simgap
 from simgap.records import UnusableInput
+from simgap.registry import MODELS
 from simgap.running.fitting import build, check_params
 
 
@@ -21,6 +22,12 @@ def test_fit_takes_what_load_takes(folder, example):
 
 def test_the_seconds_of_an_interrupted_fit_count(dataset, example):
     assert simgap.fit(example("CarriedOn"), dataset).results[0].fit_seconds > 1000
+
+
+@pytest.mark.parametrize(("outer", "params"), [("delta", {"model": "mean"}), ("ensemble", {"models": ["mean"]})])
+def test_the_seconds_of_an_interrupted_fit_count_within_another_model(outer, params, dataset, monkeypatch):
+    monkeypatch.setattr(MODELS["mean"], "earlier_seconds", 1000.0, raising=False)
+    assert simgap.fit(outer, dataset, params=params).results[0].fit_seconds > 1000
 
 
 def test_fit_raises_what_the_model_raises(dataset, example):
