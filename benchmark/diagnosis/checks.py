@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from simgap.greybox.machine_baseline import spread
 from simgap.greybox.samples import PIECE, excerpts, is_cut
 from simgap.records import Dataset
 from simgap.wording import amount
@@ -24,7 +25,8 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
         sentences.append(
             "There is one training experiment: a drift of the sensor cannot be told from a slow change of the plant."
         )
-    if dataset.channels.plant is None and is_cut(excerpts(training.train), training.train):
+    looked_at = excerpts if dataset.channels.plant is None else spread
+    if is_cut(looked_at(training.train), training.train):
         sentences.append(
             f"There are many training samples, so causes are looked for in pieces of {PIECE}: what depends on the time "
             "since the start, such as a gain that fades or a periodic disturbance, cannot show."

@@ -79,12 +79,13 @@ def promise(
 
 
 def _keeps_errors(plant: Evidence) -> bool:
-    """Tell whether an error stays in the state for longer than a record, of those that were searched in pieces."""
+    """Tell whether an error of the state is still there at the end of a record, of those that were searched in pieces.
+
+    What has numbers of its own in every experiment would have them in every piece, too, and is not asked.
+    """
     fitted = plant.identified.plant
-    body = fitted.estimate.plant
-    if not plant.selection.baseline.cut or not body.order or body.imposed or body.machine or body.n_own:
-        return False
-    return fitted.estimate.slowest * fitted.records.duration < 1
+    whole = plant.selection.baseline.cut and not fitted.estimate.plant.n_own
+    return whole and fitted.estimate.keeps_errors(fitted.records.duration)
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

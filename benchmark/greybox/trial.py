@@ -17,7 +17,7 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import in_most, on_other_records, squares_of_blocks
 from simgap.greybox.noise import explained_by_past, log_likelihood, schwarz_order
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import PIECE, Records
+from simgap.greybox.samples import Records
 from simgap.greybox.score_test import STARTS, candidates
 from simgap.greybox.terms import Term
 
@@ -37,7 +37,6 @@ OF_MEMORY = 0.25
 # Of the squared error that another model leaves of each half of the training records, fitted to the other half: what a
 # model leaves that is better, whatever a held-out record says that hardly tells the two apart.
 HALVES_LEAVE = 0.5
-PIECES_LEAVE = 0.25  # where whole held-out records speak against it, and only pieces of them for it
 FEW_STEPS = 10  # from the fit to all records to that of a half
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
@@ -182,27 +181,10 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     fits = larger.estimate, smaller.estimate
     if gain.mean() > 0:
         return halves_speak_for(baseline, *fits)
-    return pieces_speak_for(baseline, *fits) and halves_speak_for(baseline, *fits, PIECES_LEAVE)
-
-
-def pieces_speak_for(baseline: Baseline, one: Estimate, other: Estimate) -> bool:
-    """Tell whether one model errs less than the other in most pieces of the held-out records, after all.
-
-    Over a whole record, a plant that integrates carries the least offset away from the readings, and a cause that is
-    right speaks against itself until the others are found. Where training records were cut, pieces as long as those
-    may be asked.
-    """
-    if not baseline.cut or baseline.valid.mask.shape[1] < 2 * PIECE:
-        return False
-    of_one, of_other = (squares_in_pieces(baseline, fit) for fit in (one, other))
-    return in_most(of_other - of_one)
-
-
-@lru_cache(maxsize=100)
-def squares_in_pieces(baseline: Baseline, estimate: Estimate) -> np.ndarray:
-    """Sum the squares of held-out pieces, each from the start that suits it best, block by block."""
-    problem = Problem(estimate.plant, baseline.valid.pieces(PIECE), baseline.noise)
-    return squares_of_blocks(problem, on_other_records(problem, estimate.theta).errors)
+    # Where errors stay, a free run carries an offset or a drift away, and a cause that is right speaks against itself
+    # until that is found too. Then the next samples are asked, and the training records.
+    next_samples = baseline.estimate.keeps_errors(baseline.valid.duration) and larger.valid - smaller.valid > HELD_OUT
+    return next_samples and halves_speak_for(baseline, *fits, most=1.0)
 
 
 def halves_speak_for(baseline: Baseline, one: Estimate, other: Estimate, most: float = HALVES_LEAVE) -> bool:

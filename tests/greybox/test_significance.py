@@ -30,10 +30,10 @@ LIKELY = 1000.0  # a log-likelihood ratio beyond doubt
 BETTER = np.full(20, 0.5)  # held-out blocks that beat those of a trial, which are 1
 
 
-def searched(load, seed=0, limit=np.inf):
+def searched(load, seed=0, limit=np.inf, rate=1.5):
     rng = np.random.default_rng(seed)
     u = steps(rng, (4, 120), low=-0.6)
-    y = free_run(velocity(), np.clip(u + load, -limit, limit), 0.1)[0] + 0.05 * rng.standard_normal((4, 120, 1))
+    y = free_run(velocity(rate), np.clip(u + load, -limit, limit), 0.1)[0] + 0.05 * rng.standard_normal((4, 120, 1))
     made = experiments(u, y, 0.1)
     return plain_search(made[:3], made[3:], "velocity")
 
@@ -121,6 +121,22 @@ def test_what_held_out_records_leave_open_is_believed_if_training_records_foreca
     # A held-out record that stands still three times: better, as it was, and better or worse.
     blocks = np.r_[np.full(7, 0.4), np.linspace(0.9, 1.1, 7), np.full(6, last)]
     assert significant(search, replace(plain, blocks=np.ones(20)), replace(limited, blocks=blocks)) is expected
+
+
+@pytest.mark.parametrize(
+    ("rate", "forecast", "expected"), [(0.1, 3.1, True), (0.1, 2.9, False), (1.5, 3.1, False)]
+)  # an offset fades in 10 s or in 0.7 s; the records last 12 s
+def test_where_offsets_stay_the_next_samples_and_the_training_records_may_overrule_free_runs(rate, forecast, expected):
+    search = searched(0.0, limit=0.3, rate=rate)
+    plain, limited = with_effects(search), with_effects(search, "input_saturation")
+    worse = replace(limited, blocks=np.full(20, 1.1), valid=plain.valid + forecast)
+    assert significant(search, replace(plain, blocks=np.ones(20)), worse) is expected
+
+
+def test_where_offsets_stay_what_makes_no_free_run_better_is_not_believed_however_well_it_forecasts():
+    search = searched(0.0, rate=0.1)
+    made = {"squares": 0.5, "log_likelihood": LIKELY, "held_out_gain": LIKELY, "parameters": 2}
+    assert not significant(search, trial(search), trial(search, **made, held_out=np.full(20, 1.01)))
 
 
 def with_errors(made, share):
