@@ -14,10 +14,10 @@ from simgap.cores import on_cores
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.held_out import in_most, on_other_records, squares_of_blocks
+from simgap.greybox.held_out import detrended, in_most, on_other_records, squares_of_blocks
 from simgap.greybox.noise import explained_by_past, log_likelihood, schwarz_order
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records
+from simgap.greybox.samples import PIECE, Records
 from simgap.greybox.score_test import STARTS, candidates
 from simgap.greybox.terms import Term
 
@@ -37,6 +37,7 @@ OF_MEMORY = 0.25
 # Of the squared error that another model leaves of each half of the training records, fitted to the other half: what a
 # model leaves that is better, whatever a held-out record says that hardly tells the two apart.
 HALVES_LEAVE = 0.5
+PIECES_LEAVE = 0.25  # where whole held-out records speak against it, and only pieces of them for it
 FEW_STEPS = 10  # from the fit to all records to that of a half
 # Two models whose squared errors differ by less fit alike; then the simpler one is taken.
 ALIKE = 0.005
@@ -56,6 +57,7 @@ class Trial:
     k_valid: int
     memory: float  # share of the squared training errors that the errors before them explain
     blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
+    detrended: np.ndarray  # the same, where a straight line in each record counts for nothing
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,6 +88,7 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         int(plant.free.sum()), len(baseline.train.u) * plant.n_own, len(valid.u) * plant.n_own,
         explained_by_past(estimate.errors, baseline.train.mask),
         squares_of_blocks(problem, on_valid.errors),
+        squares_of_blocks(problem, detrended(on_valid.errors, valid.mask)),
     )  # fmt: skip
 
 
@@ -172,19 +175,41 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     # One simulation that grows without bound must not outweigh all other blocks.
     most = WORST * baseline.blocks_of_mean.mean()
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
+    but_lines = np.minimum(smaller.detrended, most) - np.minimum(larger.detrended, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
     if of_many or in_most(gain):
         return True
     if baseline.plant.machine is not None:
         return False
+    # Where errors stay, a drift of the sensor or a small force becomes a trend of the free run. Drifts are looked for
+    # last, and must not speak against what is looked for before them.
+    if baseline.repeated and baseline.estimate.keeps_errors(baseline.valid.duration) and in_most(but_lines):
+        return True
     fits = larger.estimate, smaller.estimate
     if gain.mean() > 0:
         return halves_speak_for(baseline, *fits)
-    # Where errors stay, a free run carries an offset or a drift away, and a cause that is right speaks against itself
-    # until that is found too. Then the next samples are asked, and the training records.
-    next_samples = baseline.estimate.keeps_errors(baseline.valid.duration) and larger.valid - smaller.valid > HELD_OUT
-    return next_samples and halves_speak_for(baseline, *fits, most=1.0)
+    return pieces_speak_for(baseline, *fits) and halves_speak_for(baseline, *fits, PIECES_LEAVE)
+
+
+def pieces_speak_for(baseline: Baseline, one: Estimate, other: Estimate) -> bool:
+    """Tell whether one model errs less than the other in most pieces of the held-out records, after all.
+
+    Over a whole record, a plant that integrates carries the least offset away from the readings, and a cause that is
+    right speaks against itself until the others are found. Where training records were cut, pieces as long as those
+    may be asked.
+    """
+    if not baseline.cut or baseline.valid.mask.shape[1] < 2 * PIECE:
+        return False
+    of_one, of_other = (squares_in_pieces(baseline, fit) for fit in (one, other))
+    return in_most(of_other - of_one)
+
+
+@lru_cache(maxsize=100)
+def squares_in_pieces(baseline: Baseline, estimate: Estimate) -> np.ndarray:
+    """Sum the squares of held-out pieces, each from the start that suits it best, block by block."""
+    problem = Problem(estimate.plant, baseline.valid.pieces(PIECE), baseline.noise)
+    return squares_of_blocks(problem, on_other_records(problem, estimate.theta).errors)
 
 
 def halves_speak_for(baseline: Baseline, one: Estimate, other: Estimate, most: float = HALVES_LEAVE) -> bool:

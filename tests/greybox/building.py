@@ -15,6 +15,7 @@ from simgap.greybox import samples as _samples
 from simgap.greybox.additions import add, with_any_more
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
+from simgap.greybox.held_out import detrended as _detrended
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
@@ -141,24 +142,30 @@ def in_order(search, trial):
 
 def trial(
     search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out=None, held_out_gain=0.0, own_there=0,
-    effects=(), memory=0.0,
+    effects=(), memory=0.0, but_lines=None,
 ):  # fmt: skip
     """A trial of hand-made numbers.
 
     `squares` of the plain model's; `own` and `own_there` count numbers of single experiments in training and held-out
     data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
-    the share of the errors that the errors before them explain.
+    the share of the errors that the errors before them explain, `but_lines` the squares of held-out blocks where a
+    straight line in each record counts for nothing.
     """
     estimate = replace(search.estimate, squares=squares * search.estimate.squares)
-    blocks = np.ones(20) if held_out is None else np.asarray(held_out, dtype=float)
+    blocks, detrended = (np.ones(20) if it is None else np.asarray(it, dtype=float) for it in (held_out, but_lines))
     likelihoods = float(log_likelihood), float(held_out_gain)
     terms = tuple(term(name) for name in effects)
-    return Trial(terms, estimate, search.train, *likelihoods, parameters, own, own_there, memory, blocks)
+    return Trial(terms, estimate, search.train, *likelihoods, parameters, own, own_there, memory, blocks, detrended)
 
 
 def by_the_other_half(search, trial):
     """The squares of training errors, block by block, each half forecast by what was fitted to the other."""
     return squares_crosswise(search, trial.estimate)
+
+
+def detrended(errors, mask):
+    """Errors without the straight line of each record."""
+    return _detrended(errors, mask)
 
 
 def score_of_trial(made):

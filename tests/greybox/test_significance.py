@@ -12,6 +12,7 @@ from .building import (
     candidates,
     chances,
     cut_in_pieces,
+    detrended,
     names_of,
     plain_search,
     ranked,
@@ -120,23 +121,34 @@ def test_what_held_out_records_leave_open_is_believed_if_training_records_foreca
     assert after.sum() < 0.5 * before.sum()
     # A held-out record that stands still three times: better, as it was, and better or worse.
     blocks = np.r_[np.full(7, 0.4), np.linspace(0.9, 1.1, 7), np.full(6, last)]
-    assert significant(search, replace(plain, blocks=np.ones(20)), replace(limited, blocks=blocks)) is expected
+    limited = replace(limited, blocks=blocks, detrended=plain.detrended)
+    assert significant(search, replace(plain, blocks=np.ones(20)), limited) is expected
 
 
 @pytest.mark.parametrize(
-    ("rate", "forecast", "expected"), [(0.1, 3.1, True), (0.1, 2.9, False), (1.5, 3.1, False)]
-)  # an offset fades in 10 s or in 0.7 s; the records last 12 s
-def test_where_offsets_stay_the_next_samples_and_the_training_records_may_overrule_free_runs(rate, forecast, expected):
-    search = searched(0.0, limit=0.3, rate=rate)
-    plain, limited = with_effects(search), with_effects(search, "input_saturation")
-    worse = replace(limited, blocks=np.full(20, 1.1), valid=plain.valid + forecast)
-    assert significant(search, replace(plain, blocks=np.ones(20)), worse) is expected
+    ("rate", "whole", "expected"), [(0.1, True, True), (0.1, False, False), (1.5, True, False)]
+)  # an error fades in 10 s or in 0.7 s; the records last 12 s
+def test_where_errors_stay_a_line_in_held_out_records_speaks_against_nothing(rate, whole, expected):
+    search = searched(0.0, rate=rate)
+    one = search if whole else cut_in_pieces(search)  # pieces of long records tell nothing of a drift
+    made = {"squares": 0.5, "log_likelihood": LIKELY, "parameters": 2, "held_out": np.full(20, 1.5)}
+    assert significant(one, trial(search), trial(search, **made, but_lines=BETTER)) is expected
+    assert not significant(one, trial(search), trial(search, **made, but_lines=np.full(20, 1.01)))
 
 
-def test_where_offsets_stay_what_makes_no_free_run_better_is_not_believed_however_well_it_forecasts():
-    search = searched(0.0, rate=0.1)
-    made = {"squares": 0.5, "log_likelihood": LIKELY, "held_out_gain": LIKELY, "parameters": 2}
-    assert not significant(search, trial(search), trial(search, **made, held_out=np.full(20, 1.01)))
+def test_lines_are_taken_out_of_the_measured_samples_of_each_record():
+    t = np.arange(50.0)
+    waves = np.sin(t)[None, :, None] * np.array([1.0, 2.0])  # [1, T, ny]
+    errors = np.concatenate([waves + 3.0 - 0.2 * t[:, None], waves - 5.0 + 0.7 * t[:, None]])
+    mask = np.ones((2, 50), dtype=bool)
+    mask[1, 40:] = False
+    errors[1, 40:] = 0.0
+    left = detrended(errors, mask)
+    for k in range(2):
+        for j in range(2):
+            fitted = np.polyval(np.polyfit(t[mask[k]], errors[k, mask[k], j], 1), t[mask[k]])
+            np.testing.assert_allclose(left[k, mask[k], j], errors[k, mask[k], j] - fitted, atol=1e-9)
+    assert not left[~mask].any()
 
 
 def with_errors(made, share):
