@@ -16,7 +16,7 @@ from simgap.greybox.held_out import in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, with_plain
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.selection import BETTER, Selection
-from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, halves_speak_for, score_gain
+from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, MATTERS_AT_ALL, halves_speak_for, score_gain
 from simgap.records import Channels, TrainingSet
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
@@ -78,7 +78,8 @@ def _far_beyond(with_effects: np.ndarray, without: np.ndarray, of_linear: np.nda
     better = gain.mean() > max(WORTH_AN_ORDER * with_effects.mean(), CONSISTENT * error)
     beside_taken = gain.mean() > BEYOND * (without.mean() - with_effects.mean())
     beside_left = of_linear.mean() < HALVES_LEAVE * with_effects.mean()
-    return bool(better and (beside_taken or beside_left))
+    matters = gain.mean() > MATTERS_AT_ALL * without.mean()  # half of next to nothing is worth no other order
+    return bool(better and (beside_taken or (beside_left and matters)))
 
 
 def _unbeaten(plain: Baseline, chosen: Estimate, linear: Baseline, channels: Channels) -> LinearRival | None:
