@@ -83,9 +83,9 @@ def _keeps_errors(plant: Evidence) -> bool:
 
     What has numbers of its own in every experiment would have them in every piece, too, and is not asked.
     """
-    fitted = plant.identified.plant
-    whole = plant.selection.baseline.cut and not fitted.estimate.plant.n_own
-    return whole and fitted.estimate.keeps_errors(fitted.records.duration)
+    records, fit = plant.identified.plant.records, plant.identified.plant.estimate
+    asked = plant.selection.baseline.cut and not fit.plant.n_own
+    return asked and fit.plant.keeps_errors(fit.theta, records.duration)
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

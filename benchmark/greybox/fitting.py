@@ -14,7 +14,6 @@ from simgap.greybox.problem import Problem
 
 MAX_STEPS = 40
 TOLERANCE = 1e-3  # of the variance of the errors: the gain that is not worth another step
-SETTLED = 3.0  # time constants in which 95 % of an error is gone
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +26,6 @@ class Estimate:
     errors: Float[np.ndarray, "E T ny"]
     squares: float
     converged: bool
-
-    @property
-    def slowest(self) -> float:
-        """Size of the slowest pole, in 1/s; 0 where the plant integrates."""
-        return float(np.min(np.abs(np.linalg.eigvals(self.plant.matrix(self.theta)))))
-
-    def keeps_errors(self, duration: float) -> bool:
-        """Tell whether an error of the state is still there after so many seconds, as in a plant that integrates."""
-        has_poles = self.plant.order > 0 and not self.plant.imposed and self.plant.machine is None
-        return has_poles and self.slowest * duration < SETTLED
 
 
 def descend(

@@ -195,7 +195,7 @@ def _of_order(
 
 def _is_of_the_input(fit: Estimate, train: Records) -> bool:
     """Tell whether all poles act within a record; a slower one beside its zero is an offset of each record."""
-    return fit.slowest * train.duration > 1
+    return fit.plant.slowest(fit.theta) * train.duration > 1
 
 
 def _likelier(larger: Sequence[Estimate], smaller: Sequence[Estimate], train: Records) -> bool:

@@ -20,6 +20,7 @@ from simgap.records import Kind
 
 FASTEST_TANK, FASTEST = 5.0, 1e6  # of poles, per sample
 SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
+SETTLED = 3.0  # time constants in which 95 % of an error is gone
 MAX_TERMS = 5  # that a search may find
 MOST_OF_A_MACHINE = 8
 
@@ -298,6 +299,15 @@ class Plant:
         a = np.empty((n, n))
         companion(sections, a)
         return a
+
+    def slowest(self, theta: Float[np.ndarray, " p"]) -> float:
+        """Return the size of the slowest pole, in 1/s; 0 where the plant integrates."""
+        return float(np.min(np.abs(np.linalg.eigvals(self.matrix(theta)))))
+
+    def keeps_errors(self, theta: Float[np.ndarray, " p"], duration: float) -> bool:
+        """Tell whether an error of the state is still there after so many seconds, as where the plant integrates."""
+        has_poles = self.order > 0 and not self.imposed and self.machine is None
+        return has_poles and self.slowest(theta) * duration < SETTLED
 
     def readings(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S ny n"]:
         """Return C of y = C z, before the sensors' effects; z = (force, rate) of an imposed motion."""

@@ -184,7 +184,8 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         return False
     # Where errors stay, a drift of the sensor or a small force becomes a trend of the free run. Drifts are looked for
     # last, and must not speak against what is looked for before them.
-    if baseline.repeated and baseline.estimate.keeps_errors(baseline.valid.duration) and in_most(but_lines):
+    stay = baseline.plant.keeps_errors(baseline.estimate.theta, baseline.valid.duration)
+    if baseline.repeated and stay and in_most(but_lines):
         return True
     fits = larger.estimate, smaller.estimate
     if gain.mean() > 0:
