@@ -60,7 +60,10 @@ def squares_of_blocks(problem: Problem, errors: np.ndarray) -> np.ndarray:
 
 
 def detrended(errors: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Take the straight line that fits best out of each record's errors [E, T, ny], as a drifting sensor adds one."""
+    """Take the straight line that fits best out of each record's errors [E, T, ny], as a drifting sensor adds one.
+
+    SciPy's detrend knows no gaps between readings, and refuses the errors of a run without bound.
+    """
     lines = np.stack([np.ones(mask.shape[1]), np.linspace(-1.0, 1.0, mask.shape[1])], axis=1)  # [T, 2]
     rest = errors.copy()
     for record, measured in zip(rest, mask, strict=True):

@@ -175,7 +175,6 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     # One simulation that grows without bound must not outweigh all other blocks.
     most = WORST * baseline.blocks_of_mean.mean()
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
-    but_lines = np.minimum(smaller.detrended, most) - np.minimum(larger.detrended, most)
     # Runs of many conditions: an effect that acts in some of them only must gain in the mean, by more than chance.
     of_many = baseline.plant.machine is not None and gain.mean() > CONSISTENT * gain.std() / math.sqrt(len(gain))
     if of_many or in_most(gain):
@@ -184,9 +183,10 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         return False
     # Where errors stay, a drift of the sensor or a small force becomes a trend of the free run. Drifts are looked for
     # last, and must not speak against what is looked for before them.
-    stay = baseline.plant.keeps_errors(baseline.estimate.theta, baseline.valid.duration)
-    if baseline.repeated and stay and in_most(but_lines):
-        return True
+    if baseline.repeated and baseline.plant.keeps_errors(baseline.estimate.theta, baseline.valid.duration):
+        but_lines = np.minimum(smaller.detrended, most) - np.minimum(larger.detrended, most)
+        if in_most(but_lines):
+            return True
     fits = larger.estimate, smaller.estimate
     if gain.mean() > 0:
         return halves_speak_for(baseline, *fits)
