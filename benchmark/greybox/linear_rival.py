@@ -57,7 +57,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         return _of_tried_order(selection, channels)
     whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
-    if _swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
+    if swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
         return None
     if _linear_or_visible(chosen):
         with_effects, without, of_linear = map(plain.held_out_errors, (chosen, plain.estimate, linear.estimate))
@@ -104,7 +104,7 @@ def _beaten(plain: Baseline, chosen: Estimate, gain: np.ndarray, linear: Baselin
     return better or halves_speak_for(plain, chosen, fit)
 
 
-def _swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: float) -> bool:
+def swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: float) -> bool:
     """Tell whether a linear model has poles, undamped as far as records show, at the frequency of a disturbance.
 
     Where every record begins at the same phase, they swing on from the usual start as the disturbance does.
@@ -112,7 +112,7 @@ def _swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: flo
     poles = np.linalg.eigvals(linear.plant.matrix(linear.theta))
     disturbances = [term for term in chosen.plant.terms if isinstance(term.effect, PeriodicDisturbance)]
     frequencies = [chosen.theta[chosen.plant.part_of(term)][1] for term in disturbances]
-    return any(np.min(np.abs(poles - 2j * math.pi * f)) < 2 * math.pi / duration for f in frequencies)
+    return any(np.any(np.abs(poles - 2j * math.pi * f) < 2 * math.pi / duration) for f in frequencies)
 
 
 def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:

@@ -6,10 +6,12 @@ from scipy.signal import lfilter
 
 from simgap.data.simulated import field, rigs
 from simgap.diagnosis.diagnose import diagnose
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.identification import identify
+from simgap.greybox.linear_rival import swings_as_the_disturbance
 from simgap.records import TrainingSet
 
-from .parts import channels, experiments
+from .parts import channels, experiments, model, term
 from .plants import free_run, position, steps
 
 
@@ -82,3 +84,17 @@ def test_a_delay_does_not_stand_for_an_order_that_held_out_noise_left_out():
     assert one.linear is not None
     assert one.linear.baseline.plant.order > 1
     assert one.plant.estimate.plant.terms == ()
+
+
+@pytest.mark.parametrize(("poles", "swings"), [((), False), ((0.5,), False), ((0.0, (2 * np.pi) ** 2), True)])
+def test_a_disturbance_is_held_by_undamped_poles_at_its_frequency_and_a_model_may_have_none(poles, swings):
+    plant = model("position", 0.01, (1.0, 1.0), 1.0).plant.having([term("periodic_disturbance")])
+    theta = np.zeros(plant.size)
+    theta[plant.part_of(plant.terms[0])] = 1.0, 1.0, 0.0  # of 1 Hz
+    linear = model("other", 0.01, poles, 1.0)
+    assert swings_as_the_disturbance(_ended_at(*linear), _ended_at(plant, theta), duration=20.0) is swings
+
+
+def _ended_at(plant, theta):
+    """A fit that ended there, whatever its errors."""
+    return Estimate(plant, theta, np.zeros((1, plant.n_local)), np.zeros((1, 2, plant.ny)), 0.0, True)
