@@ -228,7 +228,9 @@ def squares_crosswise(baseline: Baseline, estimate: Estimate) -> np.ndarray:
     halves = [Problem(estimate.plant, half, baseline.noise) for half in baseline.train.halves()]
     found = []
     for ours, others in (halves, halves[::-1]):
-        fit = descend(ours, estimate.theta, max_steps=FEW_STEPS, tolerance=TOLERANCE)
+        # From the states that suit it: from rest, the first step may lead away from where the fit to all ended.
+        start = on_other_records(ours, estimate.theta).local
+        fit = descend(ours, estimate.theta, start, max_steps=FEW_STEPS, tolerance=TOLERANCE)
         found.append(squares_of_blocks(others, on_other_records(others, fit.theta).errors))
     return np.concatenate(found)
 
