@@ -5,9 +5,10 @@ import pytest
 
 from simgap.data.simulated import field
 from simgap.greybox.identification import identify
+from simgap.records import TrainingSet
 
 from .building import order_chosen, order_of, orders_tried, plain_errors, plain_search
-from .parts import experiments
+from .parts import channels, experiments
 from .plants import Plant, free_run, position, steps, third_order, velocity
 
 DT = 0.1
@@ -130,6 +131,24 @@ def test_a_delay_does_not_buy_a_higher_order(seed):
     made = experiments(u, y + 0.02 * y.std() * rng.standard_normal(y.shape), DT)
     # Three parameters of the true plant and its delay forecast within 2 % of the noise, as nine of fourth order do.
     assert order_of(plain_search(made[:3], made[3:], "other")) == 1
+
+
+def test_a_hot_body_that_radiates_is_of_first_order_with_a_loss_that_grows_faster_than_its_temperature():
+    dt, zero, surroundings = 2.0, 273.15, 20.0  # s, K, deg C
+    rng = np.random.default_rng(2)
+    heater = steps(rng, (1, 2000), hold=120, low=0.0, high=100.0)
+    body, y = surroundings, np.zeros((1, 2000, 1))
+    for k, power in enumerate(heater[0]):
+        y[0, k] = body
+        for _ in range(10):  # 20 W per percent, 2 W/K to the air, 0.18 m2 of a black body, 400 J/K
+            radiated = 5.67e-8 * 0.18 * ((body + zero) ** 4 - (surroundings + zero) ** 4)
+            body += dt / 10 * (20.0 * power - 2.0 * (body - surroundings) - radiated) / 400.0
+    made = experiments(heater, y + 0.2 * rng.standard_normal(y.shape), dt)
+    (one,) = identify(TrainingSet((made[0][:1500],), (made[0][1500:],), 10, channels("other")))
+    assert one.linear is None
+    assert one.selection.baseline.plant.order == 1
+    assert one.selection.trial.names == ("cubic_stiffness",)
+    assert one.selection.trial.estimate.errors.std() < 0.3  # the plain model errs by some 10 K
 
 
 @pytest.mark.slow

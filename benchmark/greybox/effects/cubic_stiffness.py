@@ -18,10 +18,11 @@ class CubicStiffness(ForceEffect):
     title: ClassVar[str] = "cubic stiffness"
     explanation: ClassVar[str] = (
         "A spring that gets stiffer (or softer) the further it is stretched, in both directions: a clamped beam, "
-        "rubber near its limit, a membrane."
+        "rubber near its limit, a membrane. Of a temperature, a loss of heat that grows faster than it: radiation."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "position_torque": (
@@ -54,8 +55,8 @@ class CubicStiffness(ForceEffect):
         return [Start((0.1 * scales.force_rms / scales.x_max**3,), amplitude=0)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether the simulation has a position."""
-        return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
+        """Tell whether the simulation has a position or, of an output of another kind, a state."""
+        return scales.kind == "position" or (scales.kind == "other" and scales.order > 0)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

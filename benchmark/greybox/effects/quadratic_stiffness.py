@@ -18,10 +18,11 @@ class QuadraticStiffness(ForceEffect):
     title: ClassVar[str] = "quadratic stiffness"
     explanation: ClassVar[str] = (
         "A spring that gets stiffer in one direction and softer in the other: a preloaded or one-sided suspension, the "
-        "pull of a magnet."
+        "pull of a magnet. Of a temperature, a loss of heat that grows faster than it."
     )
     reference: ClassVar[str] = "Kovacic and Brennan, The Duffing Equation, 2011, ch. 2"
     role: ClassVar[Role] = "force"
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value", "amplitude")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
@@ -40,8 +41,8 @@ class QuadraticStiffness(ForceEffect):
         return [Start((0.1 * scales.force_rms / scales.x_max**2,), amplitude=0)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether the simulation has a position."""
-        return scales.kind == "position" or (scales.kind == "other" and scales.order > 1)
+        """Tell whether the simulation has a position or, of an output of another kind, a state."""
+        return scales.kind == "position" or (scales.kind == "other" and scales.order > 0)
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
