@@ -16,6 +16,7 @@ from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.machine import StandIn
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
+from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, Scored, candidates, score_tests, with_term
 from simgap.greybox.terms import Term, in_each_order
 from simgap.greybox.unfolding import unfolded
@@ -23,6 +24,8 @@ from simgap.greybox.unfolding import unfolded
 # Score tests below this log-likelihood ratio are not worth a refit.
 WORTH_A_REFIT = 2.0
 FIRST_STEPS = 8  # of a fit from each of many starts
+VALLEYS = 6  # of many that a fit to short pieces descends into
+LONGER = 4  # times as long are the pieces that a fit goes on with
 STOOD_IN = 0.5  # of the error: what an effect leaves whose part the poles had taken
 # Steps of a fit until the candidates are compared; the finalists are then fitted to the end.
 FEW_STEPS = 6
@@ -192,7 +195,36 @@ def _extend(
         return None
     if plant.machine is not None and (stand_in := plant.machine.stand_in(term)) is not None:
         begun = begun[:1] + _without(stand_in, baseline, estimate, plant, term)
+    if term.effect.many_valleys and plant.machine is None:
+        return baseline.fit(plant.terms, [*begun, *_from_pieces(baseline, estimate, plant, term)], MAX_STEPS)
     return baseline.fit(plant.terms, begun, max_steps)
+
+
+def _from_pieces(
+    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Begin where an effect does best in short pieces, in which the simulation stays near the readings.
+
+    Over a whole record a force over position would be looked for where a wrong simulation has led.
+    """
+    problem = baseline.in_pieces(baseline.plant)
+    pieces = replace(baseline, train=problem.records, estimate=descend(problem, baseline.estimate.theta))
+    before = descend(pieces.problem(estimate.plant), estimate.theta)
+    (scored,) = score_tests(pieces, before, [term])
+    fits = [pieces.fit(plant.terms, [start[1:]]) for start in scored[:VALLEYS]]
+    if not fits:
+        return []
+    fit, samples = min(fits, key=lambda fit: fit.squares), pieces.train.mask.shape[1]
+    while samples < baseline.train.mask.shape[1]:
+        samples *= LONGER
+        fit = _fitted_to(baseline.in_pieces(plant, samples), fit.theta)
+    return [(fit.theta, fit.local)]
+
+
+def _fitted_to(problem: Problem, theta: np.ndarray) -> Estimate:
+    """Fit a plant to other pieces, from the states that suit it: from rest, the first step may lead away."""
+    begun = descend(problem, theta, fixed=np.ones(len(theta), dtype=bool), max_steps=FIRST_STEPS)
+    return descend(problem, theta, begun.local)
 
 
 def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, max_steps: int) -> Estimate:

@@ -85,9 +85,9 @@ class Baseline:
         """Set up the fit of a plant to the training records."""
         return Problem(plant, self.train, self.noise)
 
-    def in_pieces(self, plant: Plant) -> Problem:
-        """Set up the fit of a plant to short pieces of the training records, each from a start of its own."""
-        return Problem(plant, self.train.pieces(min(PIECE, self.train.mask.shape[1])), self.noise)
+    def in_pieces(self, plant: Plant, samples: int = PIECE) -> Problem:
+        """Set up the fit of a plant to pieces of the training records, short ones, each from a start of its own."""
+        return Problem(plant, self.train.pieces(min(samples, self.train.mask.shape[1])), self.noise)
 
     def fit(
         self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray | None]], max_steps: int = MAX_STEPS

@@ -138,6 +138,8 @@ class Effect(ABC):
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {}
     # The same cause as a law with more numbers, of the same name, tried where this one was found.
     refined: ClassVar[type[Effect] | None] = None
+    # Each of its starts lies in a valley of its own: the right one is looked for in short pieces.
+    many_valleys: ClassVar[bool] = False
     # The states that the term carries through a simulation; the first two of a friction are what the drive carries and
     # what damping takes of it.
     memory: ClassVar[int] = 0

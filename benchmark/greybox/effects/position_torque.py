@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+import numpy as np
+
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
+
+MOST_PERIODS = 40  # in a travel
 
 
 @EFFECTS.register("position_torque")
@@ -26,6 +30,7 @@ class PositionTorque(ForceEffect):
         "Energy Conversion 18, 2003"
     )
     role: ClassVar[Role] = "force"
+    many_valleys: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "value")
     confounders: ClassVar[dict[str, str]] = {
         "quadratic_stiffness": (
@@ -37,15 +42,18 @@ class PositionTorque(ForceEffect):
         """Return the amplitude, the length of one period, and the phase at position zero."""
         return (
             Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
-            Parameter("period", scales.y_unit, 0.05 * scales.x_max, 2 * scales.x_max),
+            Parameter("period", scales.y_unit, 2 * scales.x_max / MOST_PERIODS, 2 * scales.x_max),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from periods of 0.2 to 1.5 times the largest distance from zero, each with two phases."""
+        """Start from all numbers of periods that a travel may hold, half a period apart, each with two phases.
+
+        A fit that begins further off is out of phase at the ends of the travel, and finds nothing.
+        """
         return [
-            Start((0.1 * scales.force_rms, length * scales.x_max, phase), amplitude=0)
-            for length in (0.2, 0.3, 0.45, 0.65, 1.0, 1.5)
+            Start((0.1 * scales.force_rms, 2 * scales.x_max / periods, phase), amplitude=0)
+            for periods in np.arange(1.5, MOST_PERIODS + 0.5, 0.5)
             for phase in (0.0, 1.57)
         ]
 
