@@ -196,7 +196,7 @@ def _extend(
     if plant.machine is not None and (stand_in := plant.machine.stand_in(term)) is not None:
         begun = begun[:1] + _without(stand_in, baseline, estimate, plant, term)
     if term.effect.many_valleys and plant.machine is None:
-        return baseline.fit(plant.terms, [*begun, *_from_pieces(baseline, estimate, plant, term)], MAX_STEPS)
+        begun, max_steps = begun + _from_pieces(baseline, estimate, plant, term), MAX_STEPS
     return baseline.fit(plant.terms, begun, max_steps)
 
 

@@ -11,7 +11,7 @@ DT, SUBSTEPS = 0.01, 20
 
 
 def axis(period, amplitude=0.3, samples=700, noise=1e-4):
-    """Records of x'' = 3 u - 2 x' - A sin(2 pi x / X), held near the middle by a loop around it; the last is held out."""
+    """Records of x'' = 3 u - 2 x' - A sin(2 pi x / X) in a loop that leads it anywhere; the last is held out."""
     rng = np.random.default_rng(3)
     goals = steps(rng, (4, samples), hold=120, low=-0.8, high=0.8)
     x, v = np.zeros(4), np.zeros(4)
