@@ -7,9 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox.baseline import Baseline
+from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.identification import Identified
+from simgap.greybox.samples import PIECE
 from simgap.greybox.selection import Selection
+from simgap.greybox.trial import has_pieces, squares_in_pieces
 from simgap.records import Channels, Experiment
 
 # Share of the changes of one signal that repeat those of the other in the same sample.
@@ -75,7 +79,7 @@ def beaten_by_order(one: Identified, channels: Channels) -> str | None:
 def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     """Tell in a sentence that the best plant beats the mean of a held-out record by no more than chance, and why."""
     baseline, trial = selection.baseline, selection.trial
-    if in_most(baseline.blocks_of_mean - trial.blocks):
+    if in_most(baseline.blocks_of_mean - trial.blocks) or (trial.terms and _better_in_pieces(baseline, trial.estimate)):
         return None
     records, plant = baseline.train, trial.estimate.plant
     read = [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]
@@ -91,6 +95,13 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     else:
         why = f"the inputs do not move {name} enough. Move them more, and faster"
     return f"No model simulates held-out {name} better than its mean, because {why}."
+
+
+def _better_in_pieces(baseline: Baseline, estimate: Estimate) -> bool:
+    """Tell whether a plant that carries errors on beats the mean of pieces of the held-out records."""
+    if not (has_pieces(baseline) and estimate.plant.keeps_errors(estimate.theta, baseline.valid.duration)):
+        return False
+    return in_most(baseline.squares_of_mean(baseline.valid.pieces(PIECE)) - squares_in_pieces(baseline, estimate))
 
 
 def _correlation(changes: Sequence[tuple[np.ndarray, np.ndarray]], lag: int) -> float:

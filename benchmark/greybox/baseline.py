@@ -66,11 +66,14 @@ class Baseline:
     @cached_property
     def blocks_of_mean(self) -> Float[np.ndarray, " K"]:
         """Squared errors of a model that knows the mean of each held-out record and no more, block by block."""
-        valid = self.valid
-        known = valid.mask[:, :, None]
+        return self.squares_of_mean(self.valid)
+
+    def squares_of_mean(self, records: Records) -> Float[np.ndarray, " K"]:
+        """Sum the squared errors of the mean of each of these records, block by block."""
+        known = records.mask[:, :, None]
         counted = np.maximum(1, known.sum(axis=1, keepdims=True))  # every reading of a record may be left out
-        means = np.sum(np.where(known, valid.y, 0.0), axis=1, keepdims=True) / counted
-        return squares_of_blocks(Problem(self.plant, valid, self.noise), valid.y - means)
+        means = np.sum(np.where(known, records.y, 0.0), axis=1, keepdims=True) / counted
+        return squares_of_blocks(Problem(self.plant, records, self.noise), records.y - means)
 
     @property
     def n_errors(self) -> int:

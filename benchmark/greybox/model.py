@@ -19,7 +19,7 @@ from simgap.greybox.noise import Noise, white
 from simgap.greybox.outliers import Outliers, flag, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records
+from simgap.greybox.samples import Records, pieces_of
 from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
 from simgap.greybox.uncertainty import Uncertainty, uncertainty
@@ -40,21 +40,38 @@ class FittedPlant:
     experiments: tuple[Experiment, ...]
     outliers: tuple[Outliers, ...] = ()
     usual: UsualStart | None = None
-    read_uncertainty: Uncertainty | None = None  # of a plant that came without its training data
+    known_uncertainty: Uncertainty | None = None  # of a plant without its training data, or fitted to pieces of them
 
     @classmethod
     def fit(cls, start: Estimate, baseline: Baseline, experiments: Sequence[Experiment]) -> FittedPlant:
-        """Fit a model that was found on excerpts to all of the experiments."""
-        records = Records.of(experiments, baseline.outputs)
-        fixed = np.ones(len(start.theta), dtype=bool)
-        first = descend(Problem(start.plant, records, baseline.noise), start.theta, fixed=fixed)
-        if baseline.outliers:
-            records = without_outliers(records, first.errors, baseline.outliers)
-        records = replace(records, soft=baseline.train.soft)
-        tolerance = 1e-3 if start.plant.machine is None else TOLERANCE  # its many runs tell more than enough
-        estimate = descend(Problem(start.plant, records, baseline.noise), start.theta, first.local, tolerance=tolerance)
-        usual = usual_start(_forecasting(start.plant), estimate, records, baseline.noise, baseline.n_init)
-        return cls(estimate, baseline.noise, baseline.outputs, records, tuple(experiments), baseline.outliers, usual)
+        """Fit a model that was found on excerpts to all of the experiments.
+
+        Effects of a plant that carries errors on are fitted to pieces of long records, as they were found: over a whole
+        one the least offset leads away from the readings, and the effects would make up for it.
+        """
+        plant, noise, theta = start.plant, baseline.noise, start.theta
+        everything = np.ones(len(theta), dtype=bool)
+        tolerance = 1e-3 if plant.machine is None else TOLERANCE  # its many runs tell more than enough
+
+        def usable(experiments: Sequence[Experiment]) -> tuple[Problem, np.ndarray]:
+            problem = Problem(plant, Records.of(experiments, baseline.outputs), noise)
+            first = descend(problem, theta, fixed=everything)
+            records = problem.records
+            if baseline.outliers:
+                records = without_outliers(records, first.errors, baseline.outliers)
+            return Problem(plant, replace(records, soft=baseline.train.soft), noise), first.local
+
+        problem, local = usable(experiments)
+        fixed, told = None, None
+        if plant.terms and baseline.cut and plant.keeps_errors(theta, problem.records.duration):
+            pieces, of_pieces = usable(pieces_of(experiments))
+            found = descend(pieces, theta, of_pieces, tolerance=tolerance)
+            theta, fixed, told = found.theta, everything, uncertainty(found, noise, pieces.records)
+        estimate = descend(problem, theta, local, fixed, tolerance=tolerance)
+        usual = usual_start(_forecasting(plant), estimate, problem.records, noise, baseline.n_init)
+        return cls(
+            estimate, noise, baseline.outputs, problem.records, tuple(experiments), baseline.outliers, usual, told
+        )
 
     def saved_state(self) -> dict[str, Any]:
         """What simulates; the training data and their errors stay behind."""
@@ -65,8 +82,8 @@ class FittedPlant:
     @cached_property
     def uncertainty(self) -> Uncertainty | None:
         """The covariance of theta; None where it is not known."""
-        if not self.experiments:
-            return self.read_uncertainty
+        if self.known_uncertainty or not self.experiments:
+            return self.known_uncertainty
         return uncertainty(self.estimate, self.noise, self.records)
 
     @classmethod

@@ -126,9 +126,14 @@ def excerpts(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -
     total = sum(map(len, experiments))
     if total <= 1.5 * samples:
         return list(experiments)
-    pieces = [x[a : a + PIECE] for x in experiments for a in range(0, max(1, len(x) - PIECE // 2), PIECE)]
+    pieces = pieces_of(experiments)
     wanted = max(2, samples * len(pieces) // sum(map(len, pieces)))
     return [pieces[i] for i in np.unique(np.linspace(0, len(pieces) - 1, wanted).round().astype(int))]
+
+
+def pieces_of(experiments: Sequence[Experiment]) -> list[Experiment]:
+    """Cut experiments into pieces of one length; what is left over at the end is a piece where it is half as long."""
+    return [x[a : a + PIECE] for x in experiments for a in range(0, max(1, len(x) - PIECE // 2), PIECE)]
 
 
 def is_cut(chosen: Sequence[Experiment], experiments: Sequence[Experiment]) -> bool:

@@ -200,10 +200,15 @@ def pieces_speak_for(baseline: Baseline, one: Estimate, other: Estimate) -> bool
     right speaks against itself until the others are found. Where training records were cut, pieces as long as those
     may be asked.
     """
-    if not baseline.cut or baseline.valid.mask.shape[1] < 2 * PIECE:
+    if not has_pieces(baseline):
         return False
     of_one, of_other = (squares_in_pieces(baseline, fit) for fit in (one, other))
     return in_most(of_other - of_one)
+
+
+def has_pieces(baseline: Baseline) -> bool:
+    """Tell whether the training records were cut and held-out ones are long enough for pieces of that length."""
+    return baseline.cut and baseline.valid.mask.shape[1] >= 2 * PIECE
 
 
 @lru_cache(maxsize=100)

@@ -14,6 +14,8 @@ pytestmark = pytest.mark.slow
 DT = 1e-3
 MASS, VISCOUS, FORCE_PER_VOLT = 95.1, 203.5, 35.15  # kg, N s/m, N/V: the EMPS (Janot, Gautier and Brunot 2019)
 
+LEAD = 0.02  # m, of a turn
+
 
 def moves(rng, samples):
     """Go from place to place with acceleration and speed limited, and rest there."""
@@ -32,8 +34,11 @@ def moves(rng, samples):
     return path[:samples]
 
 
-def record(rng, samples, friction=0.0, load=0.0):
-    """Simulate the axis under its controller: voltage, position by an encoder of 1 um, a load that wanders."""
+def record(rng, samples, friction=0.0, load=0.0, ripple=0.0):
+    """Simulate the axis under its controller: voltage, position by an encoder of 1 um, a load that wanders.
+
+    The ripple in N repeats with every turn of a screw.
+    """
     position = speed = seen = seen_speed = wandering = 0.0
     u, y = np.empty((samples, 1)), np.empty((samples, 1))
     for k, goal in enumerate(moves(rng, samples)):
@@ -43,7 +48,8 @@ def record(rng, samples, friction=0.0, load=0.0):
         voltage = min(max(1.6 * (160.0 * (goal - reading) - seen_speed), -10.0), 10.0)
         u[k], y[k] = voltage, reading
         wandering = 0.9995 * wandering + 0.004 * rng.standard_normal()
-        pushed = speed + DT * (FORCE_PER_VOLT * voltage - VISCOUS * speed + load + wandering) / MASS
+        force = FORCE_PER_VOLT * voltage + load + wandering - ripple * math.sin(2 * math.pi * position / LEAD)
+        pushed = speed + DT * (force - VISCOUS * speed) / MASS
         speed = math.copysign(max(abs(pushed) - DT * friction / MASS, 0.0), pushed)
         position += DT * speed
     return u, y
@@ -64,6 +70,16 @@ def test_friction_and_a_load_are_named_though_either_alone_is_carried_away_over_
     said = {cause.effect: cause.parameters[0].value for cause in found.causes}
     assert said["coulomb_friction"] == pytest.approx(20.4 / MASS, rel=0.1)
     assert said["constant_load"] == pytest.approx(3.2 / MASS, rel=0.3)
+
+
+def test_friction_and_what_repeats_with_every_turn_of_the_screw_are_named_with_their_sizes():
+    found = simgap.diagnose(axis(4, friction=20.4, ripple=10.0), views_too=False)
+    assert found.verdict == "named"
+    said = {cause.effect: [one.value for one in cause.parameters] for cause in found.causes}
+    assert set(said) == {"coulomb_friction", "position_torque"}
+    assert said["coulomb_friction"][0] == pytest.approx(20.4 / MASS, rel=0.1)
+    assert abs(said["position_torque"][0]) == pytest.approx(10.0 / MASS, rel=0.1)
+    assert said["position_torque"][1] == pytest.approx(LEAD, rel=0.01)
 
 
 def test_nothing_is_named_where_nothing_is_hidden():
