@@ -46,8 +46,8 @@ class FittedPlant:
     def fit(cls, start: Estimate, baseline: Baseline, experiments: Sequence[Experiment]) -> FittedPlant:
         """Fit a model that was found on excerpts to all of the experiments.
 
-        Effects of a plant that carries errors on are fitted to pieces of long records, as they were found: over a whole
-        one the least offset leads away from the readings, and the effects would make up for it.
+        A plant that carries errors on is fitted to pieces of long records, as its effects were found: over a whole one
+        the least offset leads away from the readings, and what else is fitted would make up for it.
         """
         plant, noise, theta = start.plant, baseline.noise, start.theta
         everything = np.ones(len(theta), dtype=bool)
@@ -63,7 +63,7 @@ class FittedPlant:
 
         problem, local = usable(experiments)
         fixed, told = None, None
-        if plant.terms and baseline.cut and plant.keeps_errors(theta, problem.records.duration):
+        if baseline.cut and plant.keeps_errors(theta, problem.records.duration):
             pieces, of_pieces = usable(pieces_of(experiments))
             found = descend(pieces, theta, of_pieces, tolerance=tolerance)
             theta, fixed, told = found.theta, everything, uncertainty(found, noise, pieces.records)
