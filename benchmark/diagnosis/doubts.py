@@ -99,7 +99,7 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
 
 def _better_in_pieces(baseline: Baseline, estimate: Estimate) -> bool:
     """Tell whether a plant that carries errors on beats the mean of pieces of the held-out records."""
-    if not (has_pieces(baseline) and estimate.plant.keeps_errors(estimate.theta, baseline.valid.duration)):
+    if not (has_pieces(baseline) and baseline.keeps_errors):
         return False
     return in_most(baseline.squares_of_mean(baseline.valid.pieces(PIECE)) - squares_in_pieces(baseline, estimate))
 

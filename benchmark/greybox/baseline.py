@@ -54,6 +54,11 @@ class Baseline:
         return not self.cut and len(self.train.u) >= ENOUGH_EXPERIMENTS
 
     @property
+    def keeps_errors(self) -> bool:
+        """Whether an error of the state stays to the end of a held-out record, as where the plant integrates."""
+        return self.plant.keeps_errors(self.estimate.theta, self.valid.duration)
+
+    @property
     def resolution(self) -> Float[np.ndarray, " ny"]:
         """The smallest error of each output that means anything, in training and in held-out data."""
         return self.train.resolution

@@ -63,7 +63,7 @@ class FittedPlant:
 
         problem, local = usable(experiments)
         fixed, told = None, None
-        if baseline.cut and plant.keeps_errors(theta, problem.records.duration):
+        if baseline.cut and baseline.keeps_errors:
             pieces, of_pieces = usable(pieces_of(experiments))
             found = descend(pieces, theta, of_pieces, tolerance=tolerance)
             theta, fixed, told = found.theta, everything, uncertainty(found, noise, pieces.records)

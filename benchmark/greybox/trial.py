@@ -183,7 +183,7 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         return False
     # Where errors stay, a drift of the sensor or a small force becomes a trend of the free run. Drifts are looked for
     # last, and must not speak against what is looked for before them.
-    if baseline.repeated and baseline.plant.keeps_errors(baseline.estimate.theta, baseline.valid.duration):
+    if baseline.repeated and baseline.keeps_errors:
         but_lines = np.minimum(smaller.detrended, most) - np.minimum(larger.detrended, most)
         if in_most(but_lines):
             return True
