@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
-import numpy as np
-
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
@@ -52,8 +50,8 @@ class PositionTorque(ForceEffect):
         A fit that begins further off is out of phase at the ends of the travel, and finds nothing.
         """
         return [
-            Start((0.1 * scales.force_rms, 2 * scales.x_max / periods, phase), amplitude=0)
-            for periods in np.arange(1.5, MOST_PERIODS + 0.5, 0.5)
+            Start((0.1 * scales.force_rms, 4 * scales.x_max / halves, phase), amplitude=0)
+            for halves in range(3, 2 * MOST_PERIODS + 1)  # of a period
             for phase in (0.0, 1.57)
         ]
 
