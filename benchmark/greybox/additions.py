@@ -196,13 +196,11 @@ def _extend(
     if plant.machine is not None and (stand_in := plant.machine.stand_in(term)) is not None:
         begun = begun[:1] + _without(stand_in, baseline, estimate, plant, term)
     if term.effect.many_valleys and plant.machine is None:
-        begun, max_steps = begun + _from_pieces(baseline, estimate, plant, term), MAX_STEPS
+        begun, max_steps = [*begun, _from_pieces(baseline, estimate, plant, term)], MAX_STEPS
     return baseline.fit(plant.terms, begun, max_steps)
 
 
-def _from_pieces(
-    baseline: Baseline, estimate: Estimate, plant: Plant, term: Term
-) -> list[tuple[np.ndarray, np.ndarray]]:
+def _from_pieces(baseline: Baseline, estimate: Estimate, plant: Plant, term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Begin where an effect does best in short pieces, in which the simulation stays near the readings.
 
     Over a whole record a force over position would be looked for where a wrong simulation has led.
@@ -212,13 +210,11 @@ def _from_pieces(
     before = descend(pieces.problem(estimate.plant), estimate.theta)
     (scored,) = score_tests(pieces, before, [term])
     fits = [pieces.fit(plant.terms, [start[1:]]) for start in scored[:VALLEYS]]
-    if not fits:
-        return []
     fit, samples = min(fits, key=lambda fit: fit.squares), pieces.train.mask.shape[1]
     while samples < baseline.train.mask.shape[1]:
         samples *= LONGER
         fit = _fitted_to(baseline.in_pieces(plant, samples), fit.theta)
-    return [(fit.theta, fit.local)]
+    return fit.theta, fit.local
 
 
 def _fitted_to(problem: Problem, theta: np.ndarray) -> Estimate:
