@@ -93,7 +93,7 @@ class PlantWriter:
         local = self.fitted.start(u[None], y_init[None][:, :, list(self.fitted.outputs)])
         state[self.at : self.at + plant.order] = local[0, : plant.order]
         for term, value in zip(plant.remembered, local[0, plant.order :], strict=False):
-            state[self.memory[term]] = np.clip(value, -1, 1) if plant.imposed and term.effect.port == "force" else value
+            state[self.memory[term]] = np.clip(value, -1, 1) if term.effect.port == "force" else value
         if plant.imposed and len(u) > 1:
             x = Drive(plant, u[None]).arriving(self.theta, 0, local)
             state[self.motion] = (x[0, 1] - x[0, 0]) / plant.dt

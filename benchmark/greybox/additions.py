@@ -155,7 +155,7 @@ def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | Non
 def _cost(baseline: Baseline, fit: Estimate) -> float:
     """Weigh squares against the number of parameters, for candidates of one round."""
     n = baseline.n_errors
-    parameters = int(fit.plant.free.sum()) + len(fit.local) * fit.plant.n_own
+    parameters = int(fit.plant.free.sum()) + len(fit.local) * fit.plant.n_of_terms
     return 0.5 * n * math.log(fit.squares) + 0.5 * parameters * math.log(n)
 
 

@@ -26,7 +26,7 @@ FORCE, FRICTION, OUTFLOW, RIM, STOP = range(5)
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
     _cube, _cube, _cube, _matrix, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
-    types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, types.float64[::1],
+    types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, _cube,
     types.float64[:, :, :, ::1],
 )  # fmt: skip
 
@@ -82,9 +82,11 @@ def dry_friction(v, new, gain, hold):
 
 @directly(_loop)
 def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
-    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, begun, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
+
+    What the terms remember begins as `begun` [S, E, m] says.
 
     The drive [S, E, T * substeps] is constant over each substep. Linear parts are exact; forces are extrapolated
     linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound
@@ -98,7 +100,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
     runs, experiments, samples, n = states.shape
     size, mixed = max(n, 4), n > 1 and seen[0, 0] != 0.0
     e, g0, g1, far = np.zeros((runs, size, size)), np.zeros((runs, size)), np.zeros((runs, size)), np.zeros(size)
-    z, held, before = np.zeros((runs, size)), np.zeros((runs, len(memory))), np.zeros(runs)
+    z, held, before = np.zeros((runs, size)), np.zeros((runs, begun.shape[2])), np.zeros(runs)
     for s in range(runs):
         for i in range(n):
             g0[s, i], g1[s, i] = g0s[s, i, entry], g1s[s, i, entry]
@@ -108,8 +110,8 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
         for s in range(runs):
             for i in range(size):
                 z[s, i] = start[s, experiment, i] if i < n else 0.0
-            for i in range(len(memory)):
-                held[s, i] = 0.0
+            for i in range(begun.shape[2]):
+                held[s, i] = begun[s, experiment, i]
             before[s] = 0.0
         step = 0
         for k in range(samples):
@@ -179,21 +181,19 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
 
 @directly(_loop)
 def run_tanks(  # noqa: PLR0912 - as above
-    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, memory, states
+    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, begun, states
 ):
     """Fill states [S, E, T, n] of a cascade of tanks, as run_body does; forces act on the first one as inflows."""
     _, experiments, samples, n = states.shape
     z, new, flow, before = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    held = pointer(memory)
     for run in range(len(states) * experiments):
         s, experiment = run // experiments, run % experiments
         e, g0, g1, p = es[s], g0s[s], g1s[s], pointer(thetas[s])
         u, levels, last = drive[s, experiment], states[s, experiment], rates[s, n - 1]
+        held = pointer(begun[s, experiment])
         for i in range(n):
             z[i] = start[s, experiment, i]
             before[i] = 0.0
-        for i in range(len(memory)):
-            memory[i] = 0.0
         step = 0
         for k in range(samples):
             for i in range(n):

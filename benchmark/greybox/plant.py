@@ -178,10 +178,10 @@ class Plant:
 
     @cached_property
     def remembered(self) -> tuple[Term, ...]:
-        """The terms in an unknown state at the start: those of the input, and of the force that a motion takes."""
+        """The terms in an unknown state at the start, those of the input first; a known machine begins at rest."""
         found = [term for term in self.terms if term.effect.memory and term.effect.role != "friction"]
-        ports = ("input", "force") if self.imposed else ("input",)
-        return tuple(term for port in ports for term in found if term.effect.port == port)
+        forces = [t for t in self.on("force") if t in found and (self.imposed or t.effect.begins_anywhere)]
+        return tuple([t for t in found if t.effect.port == "input"] + (forces if self.machine is None else []))
 
     @cached_property
     def n_moving(self) -> int:
@@ -197,6 +197,11 @@ class Plant:
     def n_own(self) -> int:
         """Numbers of an experiment that belong to its own terms."""
         return sum(term.effect.own for term in self.per_experiment)
+
+    @property
+    def n_of_terms(self) -> int:
+        """Numbers of an experiment that its terms ask for: their own, and where what they remember begins."""
+        return self.n_own + len(self.remembered)
 
     def own_part_of(self, term: Term) -> slice:
         """Return where the numbers of a per-experiment term stand among those of an experiment."""

@@ -127,7 +127,7 @@ class Simulator:
         if plant.machine is not None:
             return np.stack([self._machine(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
-        starts, begun = starts[:, :, :n], starts[:, :, n:]
+        starts, begun, held = starts[:, :, :n], starts[:, :, n:], self._begun(starts)
         of_poles, place = distinct(thetas[:, plant.layout.poles])
         matrices = np.array([plant.matrix(theta) for theta in thetas[of_poles]])
         steps = np.empty((3, len(matrices), n, n))
@@ -145,9 +145,15 @@ class Simulator:
         run = run_tanks if plant.cascade else run_body
         run(
             e, g0, g1, rates, seen(plant, thetas), entry, drives, starts, self.substeps, self.h, self._terms,
-            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._memory, states,
+            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, held, states,
         )  # fmt: skip
         return states
+
+    def _begun(self, starts: Float[np.ndarray, "*S E n"]) -> Float[np.ndarray, "*S E m"]:
+        """Take what the force terms remember at the start out of the initial states."""
+        begun, n = np.zeros((*starts.shape[:-1], len(self._memory))), self.plant.n_start
+        begun[..., self._remembered] = np.clip(starts[..., n - len(self._remembered) : n], -1.0, 1.0)
+        return begun
 
     def _of_machine(self) -> tuple[np.ndarray, ...]:
         """Take gain, supply and enabled [E, T] at the samples."""
@@ -174,9 +180,7 @@ class Simulator:
 
     def _forces(self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"]) -> Float[np.ndarray, "E T 2"]:
         """Compute the forces that the motion takes, and the rate that c1 multiplies: of the drive, or of the motion."""
-        states, begun = np.empty((*self.shape[:2], 2)), np.zeros((len(start), len(self._memory)))
-        n = self.plant.n_start
-        begun[:, self._remembered] = np.clip(start[:, n - len(self._remembered) : n], -1.0, 1.0)
+        states, begun = np.empty((*self.shape[:2], 2)), self._begun(start)
         x, v = self.drive.motion(theta, start)
         follow_motion(
             self.drive.of(theta, start), x, v, self.h, self._terms, self._until, np.ascontiguousarray(theta),

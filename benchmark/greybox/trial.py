@@ -53,7 +53,8 @@ class Trial:
     train: float
     valid: float
     k: int  # parameters estimated for all experiments
-    k_train: int  # parameters of single training experiments
+    own: int  # numbers of every experiment that belong to terms of its own
+    k_train: int  # parameters of single training experiments: those, and where what terms remember begins
     k_valid: int
     memory: float  # share of the squared training errors that the errors before them explain
     blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
@@ -85,7 +86,7 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         plant.terms, estimate, baseline.train,
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
-        int(plant.free.sum()), len(baseline.train.u) * plant.n_own, len(valid.u) * plant.n_own,
+        int(plant.free.sum()), plant.n_own, len(baseline.train.u) * plant.n_of_terms, len(valid.u) * plant.n_of_terms,
         explained_by_past(estimate.errors, baseline.train.mask),
         squares_of_blocks(problem, on_valid.errors),
         squares_of_blocks(problem, detrended(on_valid.errors, valid.mask)),
@@ -142,7 +143,7 @@ def _matters(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     before, gain = smaller.estimate.squares, smaller.estimate.squares - larger.estimate.squares
     if not (gain > MATTERS * before and gain > MATTERS_AT_ALL * baseline.estimate.squares):
         return False
-    held_out = 1.0 - larger.blocks.sum() / smaller.blocks.sum() if larger.k_valid == smaller.k_valid else 0.0
+    held_out = 1.0 - larger.blocks.sum() / smaller.blocks.sum() if larger.own == smaller.own else 0.0
     of_one_step = 1.0 - math.exp(-2.0 * max(0.0, larger.train - smaller.train) / baseline.n_errors)
     return not smaller.terms or bool(max(gain / before, held_out, of_one_step) > OF_MEMORY * larger.memory)
 
@@ -165,7 +166,7 @@ def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
 
 def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     """Tell whether the larger model simulates held-out data better, in most of them."""
-    if larger.k_valid > smaller.k_valid:
+    if larger.own > smaller.own:
         # Estimated anew there, so the gain must pay for that; and so in training, counted in independent samples:
         # a line through what wanders slowly seems certain, but takes little of it (Durlauf and Phillips 1988).
         price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.usual_length)

@@ -89,6 +89,8 @@ def test_the_effects_of_a_model_pass_each_other_in_the_order_of_the_chain(tmp_pa
         ("tanks", ("finer curved_input", "sqrt_outflow", "overflow", "finer curved_sensor")),
         ("velocity", ("finer inner_saturation", "coulomb_friction")),
         ("imposed", ("backlash", "coulomb_friction", "hysteresis")),
+        ("imposed", ("coulomb_friction", "finer hysteresis")),
+        ("position", ("backlash", "finer hysteresis")),
     ],
 )
 def test_in_c_it_runs_as_ours(plant, names, tmp_path):

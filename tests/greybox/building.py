@@ -155,7 +155,8 @@ def trial(
     blocks, detrended = (np.ones(20) if it is None else np.asarray(it, dtype=float) for it in (held_out, but_lines))
     likelihoods = float(log_likelihood), float(held_out_gain)
     terms = tuple(term(name) for name in effects)
-    return Trial(terms, estimate, search.train, *likelihoods, parameters, own, own_there, memory, blocks, detrended)
+    numbers = parameters, int(own_there > 0), own, own_there
+    return Trial(terms, estimate, search.train, *likelihoods, *numbers, memory, blocks, detrended)
 
 
 def by_the_other_half(search, trial):

@@ -143,6 +143,8 @@ class Effect(ABC):
     # The states that the term carries through a simulation; the first two of a friction are what the drive carries and
     # what damping takes of it.
     memory: ClassVar[int] = 0
+    # They begin anywhere, where those of a force on a body else begin at zero.
+    begins_anywhere: ClassVar[bool] = False
     # What the simulation does with the value of a force term.
     role: ClassVar[Role] = "force"
     # Substeps per sample that the term needs.

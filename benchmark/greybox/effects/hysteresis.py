@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from typing import ClassVar, final
 
+import numpy as np
+from jaxtyping import Float
+
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.bouc_wen import BoucWen
+from simgap.greybox.effects.effect import MOTION, Effect, ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
@@ -15,32 +19,14 @@ from simgap.registry import EFFECTS
 class Hysteresis(ForceEffect):
     """f = -F z, d dz/dt = v - (abs(v) z + v abs(z)) / 2 (Bouc-Wen, n = 1, beta = gamma)."""
 
-    name: ClassVar[str] = "hysteresis"
-    title: ClassVar[str] = "hysteresis"
-    explanation: ClassVar[str] = (
-        "A force that depends on the path and not on the speed: after each reversal it builds up over a certain travel "
-        "and then stays. Seals, wire ropes, piezo stacks, friction before sliding."
-    )
-    reference: ClassVar[str] = "Bouc 1967, Wen 1976; Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009"
-    role: ClassVar[Role] = "force"
-    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "sign of velocity", "rate of change")
-    confounders: ClassVar[dict[str, str]] = {
-        "stribeck_friction": (
-            "make very small strokes: a hysteretic force pulls back like a spring, dry friction just sticks"
-        ),
-        "sensor_lag": (
-            "repeat a slow triangle at half the speed: with a lag the loop of output over input becomes half as wide, "
-            "with hysteresis it stays as it was"
-        ),
-        "input_delay": (
-            "repeat a slow triangle at half the speed: with a delay the loop of output over input becomes half as "
-            "wide, with hysteresis it stays as it was"
-        ),
-        "quadratic_drag": (
-            "run at two constant speeds, one twice the other: drag becomes four times as large, a hysteretic force "
-            "stays the same"
-        ),
-    }
+    name: ClassVar[str] = BoucWen.name
+    title: ClassVar[str] = BoucWen.title
+    explanation: ClassVar[str] = BoucWen.explanation
+    reference: ClassVar[str] = BoucWen.reference
+    role: ClassVar[Role] = BoucWen.role
+    refined: ClassVar[type[Effect] | None] = BoucWen
+    shows_in: ClassVar[tuple[ViewName, ...]] = BoucWen.shows_in
+    confounders: ClassVar[dict[str, str]] = BoucWen.confounders
     memory: ClassVar[int] = 1
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
@@ -64,6 +50,11 @@ class Hysteresis(ForceEffect):
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is that of a motion."""
         return scales.kind in MOTION
+
+    def as_refined(self, values: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 4"]:
+        """Return the numbers of the same law by its stiffness and what that loses and gains on the way."""
+        force, travel, gap = values
+        return np.array([force / travel, 1 / travel, 0.0, gap])
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
