@@ -38,6 +38,7 @@ THRESHOLDS = (
     ("simgap.greybox.trial", "WORST"),
     ("simgap.greybox.selection", "BETTER"),
     ("simgap.greybox.selection", "CONFIRMED"),
+    ("simgap.greybox.plant", "SETTLED"),
     ("simgap.greybox.linear", "WORTH_AN_ORDER"),
     ("simgap.greybox.linear", "UNEXPLAINED"),
     ("simgap.greybox.linear", "EARLY"),
