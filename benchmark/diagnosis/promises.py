@@ -79,13 +79,12 @@ def promise(
 
 
 def _keeps_errors(plant: Evidence) -> bool:
-    """Tell whether an error of the state is still there at the end of a record, of those that were searched in pieces.
+    """Tell whether an error of the state is still there at the end of a record, as where the plant integrates.
 
     What has numbers of its own in every experiment would have them in every piece, too, and is not asked.
     """
     records, fit = plant.identified.plant.records, plant.identified.plant.estimate
-    asked = plant.selection.baseline.cut and not fit.plant.n_own
-    return asked and fit.plant.keeps_errors(fit.theta, records.duration)
+    return not fit.plant.n_own and fit.plant.keeps_errors(fit.theta, records.duration)
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

@@ -86,7 +86,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
 
-    What the terms remember begins as `begun` [S, E, m] says.
+    What the terms remember begins at `begun` [S, E, m].
 
     The drive [S, E, T * substeps] is constant over each substep. Linear parts are exact; forces are extrapolated
     linearly over a substep (exponential Adams-Bashforth of order 2); dry friction is the impulse within its bound

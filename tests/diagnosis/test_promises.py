@@ -13,6 +13,7 @@ from simgap.greybox.evidence import Evidence
 from simgap.greybox.identification import identify
 from simgap.greybox.model import GreyBoxModel
 from simgap.greybox.plant import MAX_TERMS
+from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,35 @@ def test_where_nothing_is_confirmed_all_are_suspects_and_the_gain_is_theirs(prom
     assert none.causes == ()
     assert names(none.suspects) == names(both.causes)
     assert none.gain.after == both.gain.after
+
+
+def unequal_drive(rng, name):
+    """A drive that integrates and pushes harder forwards than back: 10 s at 100 Hz."""
+    u = np.repeat(rng.uniform(-1, 1, 50), 20)
+    x, v, dt = np.zeros(1000), 0.0, 0.01
+    for k, push in enumerate(u[:-1]):
+        v += dt * (20 * push * (1.1 if push > 0 else 0.9) - 8 * v)
+        x[k + 1] = x[k] + dt * v
+    return Experiment(name, u[:, None], (x + 0.005 * rng.standard_normal(1000))[:, None], dt)
+
+
+@pytest.mark.slow
+def test_where_a_drive_integrates_pieces_of_the_test_confirm_what_a_whole_record_does_not(monkeypatch):
+    real = gains.measure
+
+    def measure(dataset, *runs):
+        gain = real(dataset, *runs)
+        return gain if len(dataset.test[0]) < 1000 else replace(gain, low=-0.1)
+
+    monkeypatch.setattr(promises.gains, "measure", measure)
+    rng = np.random.default_rng(0)
+    *train, valid, one, other = [unequal_drive(rng, f"e{i}") for i in range(6)]
+    channels = Channels((Channel("u", "V"),), (Channel("x", "m", "position"),))
+    training = TrainingSet(tuple(train), (valid,), 10, channels)
+    answer = diagnose(Dataset("drive", training, (one, other), 10, channels), views_too=False)
+    assert names(answer.causes) == ["asymmetric_gain"]
+    assert answer.findings.gain.low == -0.1
+    assert answer.findings.gain.in_pieces.low > 0.5
 
 
 def test_what_helps_a_simulation_that_is_worse_than_the_mean_is_only_suspected(promised):
