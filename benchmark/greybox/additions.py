@@ -13,10 +13,10 @@ import numpy as np
 from simgap.cores import on_cores
 from simgap.greybox.baseline import MAX_STEPS, TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.held_out import on_other_records
 from simgap.greybox.machine import StandIn
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import refit_from_poles
-from simgap.greybox.problem import Problem
 from simgap.greybox.score_test import STARTS, Scored, candidates, score_tests, with_term
 from simgap.greybox.terms import Term, in_each_order
 from simgap.greybox.unfolding import unfolded
@@ -213,14 +213,9 @@ def _from_pieces(baseline: Baseline, estimate: Estimate, plant: Plant, term: Ter
     fit, samples = min(fits, key=lambda fit: fit.squares), pieces.train.mask.shape[1]
     while samples < baseline.train.mask.shape[1]:
         samples *= LONGER
-        fit = _fitted_to(baseline.in_pieces(plant, samples), fit.theta)
+        longer = baseline.in_pieces(plant, samples)
+        fit = descend(longer, fit.theta, on_other_records(longer, fit.theta).local)  # from rest, it may be led away
     return fit.theta, fit.local
-
-
-def _fitted_to(problem: Problem, theta: np.ndarray) -> Estimate:
-    """Fit a plant to other pieces, from the states that suit it: from rest, the first step may lead away."""
-    begun = descend(problem, theta, fixed=np.ones(len(theta), dtype=bool), max_steps=FIRST_STEPS)
-    return descend(problem, theta, begun.local)
 
 
 def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, max_steps: int) -> Estimate:
