@@ -180,8 +180,11 @@ class Plant:
     def remembered(self) -> tuple[Term, ...]:
         """The terms in an unknown state at the start, those of the input first; a known machine begins at rest."""
         found = [term for term in self.terms if term.effect.memory and term.effect.role != "friction"]
-        forces = [t for t in self.on("force") if t in found and (self.imposed or t.effect.begins_anywhere)]
-        return tuple([t for t in found if t.effect.port == "input"] + (forces if self.machine is None else []))
+        inputs = [term for term in found if term.effect.port == "input"]
+        if self.machine is not None:
+            return tuple(inputs)
+        forces = [term for term in found if term.effect.port == "force"]
+        return (*inputs, *(term for term in forces if self.imposed or term.effect.begins_anywhere))
 
     @cached_property
     def n_moving(self) -> int:

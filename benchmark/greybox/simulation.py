@@ -127,7 +127,7 @@ class Simulator:
         if plant.machine is not None:
             return np.stack([self._machine(*of_run) for of_run in zip(thetas, starts, strict=True)])
         n, s = plant.order, len(thetas)
-        starts, begun, held = starts[:, :, :n], starts[:, :, n:], self._begun(starts)
+        at_start, begun = np.ascontiguousarray(starts[:, :, :n]), starts[:, :, n:]
         of_poles, place = distinct(thetas[:, plant.layout.poles])
         matrices = np.array([plant.matrix(theta) for theta in thetas[of_poles]])
         steps = np.empty((3, len(matrices), n, n))
@@ -138,14 +138,13 @@ class Simulator:
         drives = self.drive.of_each(thetas[of_drive], begun[of_drive])[place]
         states = np.empty((s, experiments, samples, n))
         entry = 0 if plant.cascade else ENTRY if plant.joint else n - 1
-        starts = np.ascontiguousarray(starts)
         if not self._until[-1]:
-            run_linear(e, g0, entry, drives, starts, self.substeps, states)
+            run_linear(e, g0, entry, drives, at_start, self.substeps, states)
             return states
         run = run_tanks if plant.cascade else run_body
         run(
-            e, g0, g1, rates, seen(plant, thetas), entry, drives, starts, self.substeps, self.h, self._terms,
-            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, held, states,
+            e, g0, g1, rates, seen(plant, thetas), entry, drives, at_start, self.substeps, self.h, self._terms,
+            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._begun(starts), states,
         )  # fmt: skip
         return states
 
