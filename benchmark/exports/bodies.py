@@ -44,6 +44,21 @@ def stop_body(new: list, fast: int, low: float, high: float):
         new[0] = end
 
 
+def one_way_body(new: list, n: int, x: float, most: float, h: float):
+    """Let x, a substep of h seconds ago, return to zero no faster than at the rate `most`."""
+    rate = new[1] if n > 1 else (new[0] - x) / h
+    kept = rate
+    if x > 0.0:
+        kept = max(rate, -most)
+    elif x < 0.0:
+        kept = min(rate, most)
+    if kept != rate and n > 1:
+        new[0] += 0.5 * h * (kept - rate)
+        new[1] = kept
+    elif kept != rate:
+        new[0] = x + h * kept if abs(x) > h * most else rate * (h - abs(x) / (most + 1e-300))
+
+
 def flow_out(flow: list, i: int, n: int, out: float):
     """Let so much more flow out of tank i, into the next one if there is one."""
     flow[i] -= out

@@ -227,6 +227,10 @@ def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term
         theta, local = plant.carry(plain.plant, plain.theta, plain.local)
         theta[plant.n_linear :] = thetas[0][plant.n_linear :]
         return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
+    if term.effect.replaces_spring and plant.order == 2 and (stiffness := estimate.theta[1]) > 0:
+        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        theta[plant.part_of(term)] = term.effect.as_spring(stiffness, plant.scales.of(term))
+        fit = min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
     far_off = fit.squares >= STOOD_IN * baseline.estimate.squares
     if not (term.effect.errors_grow and far_off) or plant.joint or plant.per_experiment:
         return fit

@@ -59,7 +59,7 @@ def test_a_plain_rig_is_the_exact_discretisation_of_its_linear_equation(rig):
     else:
         a, b = np.array([[0.0, 1.0], [-r.stiffness - r.loop * r.gain, -r.damping]]), np.array([[0.0], [r.gain]])
     a, b, *_ = cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), r.dt)  # the input is held
-    rows_of = {"position": [1.0, 0.0], "velocity": [0.0, 1.0], "level": [1.0, 0.0]}
+    rows_of = {"position": [1.0, 0.0], "velocity": [0.0, 1.0], "level": [1.0, 0.0], "other": [1.0, 0.0]}
     c = np.array([rows_of[output.kind] for output in r.outputs])  # [ny, 2]
     for experiment in experiments(hide(rig, {}, noise=0.0)):
         # The start is not told, so it is found: the free response is linear in it.
@@ -135,6 +135,17 @@ def test_friction_that_falls_with_speed_asks_for_more_force_to_start_than_to_go_
         assert np.all(rig.gain * np.abs(experiment.u[started, 0]) >= rig.breakaway * high)
         going = experiment.y[1:, 0] * experiment.y[:-1, 0] > 0
         assert np.any(rig.gain * np.abs(experiment.u[:-1, 0])[going] < 1.5 * high)
+
+
+@pytest.mark.parametrize("rig", ["cart", "supply"])
+def test_what_cannot_brake_returns_to_zero_no_faster_than_it_coasts_and_rises_as_before(rig):
+    most = physical(rig, {"one_way_drive": 1.0})["one_way_drive"]
+    held, free = (clean(rig, *hidden).reshape(-1, 300) for hidden in (["one_way_drive"], []))
+    outwards = [np.diff(y, axis=1) * np.sign(y[:, :-1]) / RIGS[rig].dt for y in (held, free)]
+    outwards = [rate[(y[:, :-1] * y[:, 1:]) > 0] for rate, y in zip(outwards, (held, free), strict=True)]
+    assert outwards[0].min() >= -most * (1 + 1e-9) > 1.5 * outwards[1].min()
+    assert np.sum(np.isclose(outwards[0], -most)) > 200
+    assert outwards[0].max() > 1.5 * most
 
 
 @pytest.mark.parametrize("rig", ["tank", "tanks"])

@@ -14,8 +14,9 @@ from simgap.records import Kind
 
 Port = Literal["input", "force", "output"]
 # What the simulation does with the value of a force term: adds it to the forces; lets dry friction hold up to it; lets
-# so much flow out of a tank on top of its linear outflow; lets the tank overflow above it; or stops a body there.
-Role = Literal["force", "friction", "outflow", "rim", "stop"]
+# so much flow out of a tank on top of its linear outflow; lets the tank overflow above it; stops a body there; or lets
+# the output return to zero no faster.
+Role = Literal["force", "friction", "outflow", "rim", "stop", "one-way"]
 
 
 @dataclass(frozen=True)
@@ -209,6 +210,10 @@ class Effect(ABC):
     def as_refined(self, values: np.ndarray) -> np.ndarray | None:
         """Return its numbers as those of the refined law, where that contains it."""
         return None
+
+    def as_spring(self, stiffness: float, scales: SignalScales) -> tuple[float, ...]:
+        """Return numbers with which it pulls back as the linear spring does whose place it takes."""
+        raise NotImplementedError
 
     @staticmethod
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:

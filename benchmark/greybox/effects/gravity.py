@@ -63,6 +63,11 @@ class Gravity(ForceEffect):
             for angle in (0.0, 0.5 * math.pi, -0.5 * math.pi)
         ]
 
+    def as_spring(self, stiffness: float, scales: SignalScales) -> tuple[float, ...]:
+        """Return the pendulum that hangs at zero and swings as fast."""
+        radian = _radian(scales.y_unit) or 1.0
+        return stiffness / radian, 0.0, radian
+
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is an angle that moves by more than a twelfth of a turn."""
         return scales.kind == "position" and _radian(scales.y_unit) * scales.x_max > 0.5

@@ -21,17 +21,18 @@ class Hidden(NamedTuple):
     tanks: float | None
     arm: float | None = None
     servo: float | None = None
+    supply: float | None = None
 
 
 CATALOGUE = {
-    "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0, 0.7),
-    "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5),
-    "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None),
-    "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0),
+    "dead_zone": Hidden("dead_zone", "U, each way", 1.0, 1.2, 1.2, 2.0, 2.0, 0.7, None, 1.2),
+    "input_saturation": Hidden("limit", "U, each way", 1.2, 1.5, 1.5, 4.5, 4.5, None, None, 1.5),
+    "asymmetric_gain": Hidden("asymmetry", "share", 0.4, 0.4, 0.4, None, None, None, None, 0.4),
+    "curved_input": Hidden("squared", "share that acts by its square", 1.0, 1.0, 1.0, 1.0, 1.0, None, None, 1.0),
     "rate_limit": Hidden("rate", "U/s upwards, half of it downwards", 3.5, 10.0, 4.0, 0.12, 0.06),
     "backlash": Hidden("gap", "U, whole gap", 1.6, 2.0, 2.0, 2.0, 2.0),
     "valve_stiction": Hidden("stick", "U, stick band", 2.0, 2.5, 2.5, 2.5, 2.5),
-    "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12),
+    "input_delay": Hidden("delay", "s", 0.4, 0.1, 0.3, 12.0, 24.0, 0.12, None, 0.0002),
     "actuator_lag": Hidden("lag", "s", 0.5, 0.1, 0.4, None, None),
     "inner_saturation": Hidden("inner_limit", "U, upwards, behind a lag", 0.8, 1.0, 1.0, 4.0, 4.0),
     "torque_foldback": Hidden("fold", "Y, error of the controller", None, None, None, None, None, None, 0.15),
@@ -49,16 +50,19 @@ CATALOGUE = {
     "periodic_disturbance": Hidden("periodic", "L/s^2", 0.8, 50.0, 10.0, 0.06, 0.06),
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),
     "hard_stop": Hidden("stop", "L, each way", None, 4.0, 7.0, None, None, 1.0),
+    "one_way_drive": Hidden("coast", "Y/s back to zero", 0.8, None, None, None, None, None, None, 6e3),
     "sqrt_outflow": Hidden("root", "share", None, None, None, 1.0, 1.0),
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
     "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),
     "sensor_bias": Hidden("bias", "Y, standard deviation", 0.3, 2.0, 3.0, 0.9, 1.2),
-    "curved_sensor": Hidden("sensor_squared", "share that shows by its square", 0.8, 0.8, 0.8, 0.8, 0.8),
-    "sensor_saturation": Hidden("sensor_limit", "Y, each way", 0.5, 4.0, 7.0, 11.0, 11.0),
+    "curved_sensor": Hidden(
+        "sensor_squared", "share that shows by its square", 0.8, 0.8, 0.8, 0.8, 0.8, None, None, 0.8
+    ),
+    "sensor_saturation": Hidden("sensor_limit", "Y, each way", 0.5, 4.0, 7.0, 11.0, 11.0, None, None, 8.0),
     "sensor_lag": Hidden("sensor_lag", "s", 0.5, 0.1, 0.4, None, None),
     "absolute_sensor": Hidden("absolute", "", 1.0, 1.0, 1.0, None, None),
-    "quantisation": Hidden("step", "Y", 0.6, 4.0, 7.0, 2.5, 3.0),
-    "outliers": Hidden("outlier_rate", "share of the samples", 0.02, 0.02, 0.02, 0.02, 0.02),
+    "quantisation": Hidden("step", "Y", 0.6, 4.0, 7.0, 2.5, 3.0, None, None, 8.0),
+    "outliers": Hidden("outlier_rate", "share of the samples", 0.02, 0.02, 0.02, 0.02, 0.02, None, None, 0.02),
 }
 OUTSIDE = {  # no diagnosis knows these by name
     "position_dependent_gain": Hidden("ripple", "share", None, 0.6, 0.6, None, None),
@@ -88,7 +92,7 @@ def physical(rig: str, effects: Mapping[str, float]) -> dict[str, float]:
             known = ", ".join((*suitable(rig), *suitable(rig, outside=True)))
             raise ValueError(f"{name!r} cannot be hidden in {rig!r}; what can be: {known}")
         sizes[name] = strength * strong
-        if row.field == "rate":
+        if row.field in {"rate", "coast"}:
             sizes[name] = strong / strength if strength > 0 else inf
         elif row.field in {"limit", "inner_limit", "sensor_limit", "rim", "stop", "fold"}:
             full = RIGS[rig].largest_input if row.field in {"limit", "inner_limit"} else RIGS[rig].reach

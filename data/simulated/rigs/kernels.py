@@ -45,6 +45,7 @@ class Body(NamedTuple):
     ripple: float  # share by which the gain changes over position
     ripple_period: float  # L
     stop: float  # L from the centre, each way; infinite is off
+    coast: float  # L/s, of a cart L/s^2, how fast it can return to zero; infinite is off
     push: float  # 1/s, negative damping at the centre
     push_width: float  # L from the centre to where it turns into damping
     loop: float  # 1 where a position controller inside acts on w - x, 0 where w is the drive itself
@@ -178,6 +179,22 @@ def stopped(p, x, v):
     return x, v
 
 
+@njit(cache=True)
+def coasting(p, h, before, rate, x, v):
+    """Let a body that was at (before, rate) h seconds ago return to zero no faster than it may."""
+    if p.stiffness != 0.0:  # its position
+        side = 1.0 if before > 0.0 else -1.0
+        if side * v < -p.coast:
+            x = before + 0.5 * h * side * (max(side * rate, -p.coast) - p.coast)
+            v = -side * p.coast
+        return x, v
+    side = 1.0 if rate > 0.0 else -1.0  # its velocity
+    if side * (v - rate) >= -h * p.coast:
+        return x, v
+    slowing = abs(rate) / p.coast  # s, until it stands; then the drive may push it the other way
+    return x, rate - side * h * p.coast if slowing > h else (v - rate) * (1.0 - slowing / h)
+
+
 @njit(types.float64[:, ::1](floats(Body), *RECORD), cache=True)
 def move(p, drive, u, other, x, v, dt, substeps):
     """Integrate (x, v) [T substeps, 2] under the input u [T] and a force `other` [T + 1], straight between samples."""
@@ -189,6 +206,7 @@ def move(p, drive, u, other, x, v, dt, substeps):
     for step in range(len(motion)):
         motion[step, 0], motion[step, 1] = x, v
         x, v, z = step_body(p, w[step], outside(other, step, substeps), step * h, h, x, v, z)
+        x, v = coasting(p, h, motion[step, 0], motion[step, 1], x, v)
         x, v = stopped(p, x, v)
     return motion
 

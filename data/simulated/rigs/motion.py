@@ -42,10 +42,11 @@ def simulate_motion(
         return fill(tanks, drive, u, other, first, second, rig.dt, substeps)[:, :1].copy()
     known = {field: getattr(rig, field) for field in Body._fields if hasattr(rig, field)}
     known |= {"position_period": rig.period, "position_phase": 1.0, "phase": 0.7, "stop": size.get("stop", inf)}
+    known |= {"coast": size.get("coast", inf)}
     known |= {"fold": size.get("fold", inf), "fold_lost": FOLD_LOST}
     body = Body(**{field: known.get(field, size.get(field, 0.0)) for field in Body._fields})
     motion = move(body, drive, u, other, first, second, rig.dt, substeps)
-    return motion[:, [{"position": 0, "velocity": 1}[output.kind] for output in rig.outputs]]
+    return motion[:, [{"velocity": 1}.get(output.kind, 0) for output in rig.outputs]]
 
 
 def _band(samples: int, rng: Generator) -> Float[np.ndarray, " n"]:

@@ -102,5 +102,10 @@ RIGS = {
             "servo", 0.01, Channel("goal", "rad"), (Channel("angle", "rad", "position"),),
             gain=300.0, amplitude=1.5, reach=1.5, damping=25.0, loop=1.0, start=(0.1, 0.3), frequency=0.7, outlier=2.0,
         ),
+        Rig(
+            "supply", 1e-4, Channel("control", "V"), (Channel("v", "V"),),
+            gain=9e6, amplitude=5.0, reach=20.0, damping=1500.0, stiffness=2.25e6, start=(4.0, 4e3), frequency=250.0,
+            outlier=26.0,
+        ),
     )
 }  # fmt: skip
