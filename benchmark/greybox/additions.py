@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -130,12 +130,21 @@ def _from_best(baseline: Baseline, best: Estimate, general: Term, other: tuple[E
     return min(fit, of_own, as_special_case(baseline, best, general, term), key=lambda fit: fit.squares)
 
 
+def simpler(estimate: Estimate, term: Term) -> Mapping[str, np.ndarray]:
+    """Return the laws with fewer numbers that may do as well as a term as it was fitted, with their numbers."""
+    plant = estimate.plant
+    if term in plant.per_experiment:
+        return {}
+    assert plant.scales is not None
+    return term.effect.simpler(estimate.theta[plant.part_of(term)], plant.scales.of(term))
+
+
 def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, special: Term) -> Estimate:
     """Fit a model again with a special case in the place of an effect, begun with what the two share."""
     plant = baseline.plant.having([*(term for term in estimate.plant.terms if term != general), special])
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-    part, shared = plant.part_of(special), list(general.effect.contains[special.effect.name])
-    numbers = estimate.theta[estimate.plant.part_of(general)][shared]
+    part = plant.part_of(special)
+    numbers = simpler(estimate, general)[special.effect.name]
     theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
     return baseline.fit(plant.terms, [(theta, local)])
 

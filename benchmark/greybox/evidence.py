@@ -106,16 +106,17 @@ class Evidence:
         return of_outliers + [self._cause(term, share, profiles) for term, share in self._in_order]
 
     def runners_up(self) -> list[Rival]:
-        """List the other effects of the last round that began without any."""
+        """List the other effects by themselves, and how far each is behind the best of those chosen by itself."""
         chosen = self.selection.trial
-        first = [r for r in self.selection.rounds if not r.before.terms and len(r.trials) > 1][-1:]
+        alone = [r for r in self.selection.rounds if not r.before.terms and len(r.trials) > 1][-1:]
+        named = [trial.score for r in alone for trial in r.trials if set(chosen.names) & set(trial.names)]
         return [
-            Rival(trial.terms[-1].effect, gained(r.before, trial), r.trials[0].score - trial.score)
-            for r in first
+            Rival(trial.terms[-1].effect, gained(r.before, trial), max(named) - trial.score)
+            for r in alone if named
             for trial in r.trials
             if not set(chosen.names) & set(trial.names)
             and not any(trial.terms[-1].replaces(term) for term in chosen.terms)
-        ]
+        ]  # fmt: skip
 
     def _cause(self, term: Term, share: float, profiles: bool) -> Cause:
         baseline, chosen, effect = self.selection.baseline, self.selection.trial, term.effect

@@ -16,6 +16,7 @@ from simgap.greybox.additions import (
     from_other_poles,
     key_of,
     refine,
+    simpler,
     with_any_more,
 )
 from simgap.greybox.baseline import Baseline
@@ -202,7 +203,7 @@ class _Search:
         That is an effect, or what makes it more general than a special case of it.
         """
         while trial.terms:
-            choices = [(term, special) for term in trial.terms for special in (None, *self._special_cases(term))]
+            choices = [(term, special) for term in trial.terms for special in (None, *self._special_cases(trial, term))]
             smaller = on_cores(partial(with_less, self.baseline, trial, self.noise_order), choices)
             fitted = zip(choices, smaller, strict=True)
             self.parts = {_key(other.terms): other for (_, special), other in fitted if special is None}
@@ -216,8 +217,10 @@ class _Search:
             trial = max(enough, key=lambda other: other.score)
         return trial
 
-    def _special_cases(self, term: Term) -> list[Term]:
-        return [t for t in candidates(self.baseline) if term.replaces(t) and t.channel == term.channel]
+    def _special_cases(self, trial: Trial, term: Term) -> list[Term]:
+        laws = simpler(trial.estimate, term)
+        others = [other for other in candidates(self.baseline) if other not in trial.terms] if laws else []
+        return [other for other in others if other.effect.name in laws and other.channel == term.channel]
 
     def exchange(self, trial: Trial, *asked: Among) -> Trial:
         """Try every other effect that is asked for in the place of each: the first was chosen without the others.

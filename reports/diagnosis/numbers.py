@@ -49,7 +49,10 @@ def change(before: float, after: float) -> str:
     """Write a change in percent: 1.2, 0.6 -> "-50 %"."""
     if not (math.isfinite(before) and math.isfinite(after) and before > 0):
         return ""
-    return f"{100 * (after / before - 1):+.0f} %".replace("+0 %", "0 %").replace("-0 %", "0 %")
+    share = after / before - 1
+    if -1 < share < -0.99:  # "-100 %" would say that nothing is left
+        return f"-{percent(-share)}"
+    return f"{100 * share:+.0f} %".replace("+0 %", "0 %").replace("-0 %", "0 %")
 
 
 def share(value: float) -> str:

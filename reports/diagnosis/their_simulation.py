@@ -36,7 +36,9 @@ def nothing_found(findings: Findings) -> str:
                 f"Nothing is named: {better}, although the input still predicts {percent(learnable)} of its squared "
                 "error on the test experiments."
             )
-        return f"Nothing found: {better}, and the input predicts hardly anything more of its error."
+        fits = findings.baseline.get("fit_percent", {}).values()
+        worse = " The mean of the output would be a better guess than this model." if any(f < 0 for f in fits) else ""
+        return f"Nothing found: {better}, and the input predicts hardly anything more of its error.{worse}"
     if not findings.simulation.linear_differs:
         return "Nothing found: your simulation lacks nothing that these data show."
     return (

@@ -28,7 +28,7 @@ def headline(findings: Findings) -> str:
             "Something is there, but nothing in the catalogue explains it: "
             f"{percent(findings.left)} of the squared error could still be predicted from the input."
         )
-    listed, several = _listed(findings.effects, findings), len(findings.effects) > 1
+    listed, several = _listed(findings.effects, findings, told_apart=True), len(findings.effects) > 1
     them = "them" if several else "it"
     if math.isfinite(gain.share):
         change = f"{'falls' if gain.share >= 0 else 'rises'} by {percent(abs(gain.share))}{_range(findings)}"
@@ -61,9 +61,14 @@ def _not_shown(findings: Findings) -> str:
     return f"the test experiments {says}: with {them} the free-run error"
 
 
-def _listed(causes: Sequence[Cause], findings: Findings) -> str:
-    names = [cause_title(cause, findings) for cause in causes]
+def _listed(causes: Sequence[Cause], findings: Findings, told_apart: bool = False) -> str:
+    names = [cause_title(cause, findings) + _or_others(cause) * told_apart for cause in causes]
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def _or_others(cause: Cause) -> str:
+    """Name what the data do not tell from a cause."""
+    return f" (or {' or '.join(other.title for other in cause.confounded_with)})" if cause.confounded_with else ""
 
 
 def cause_title(cause: Cause, findings: Findings) -> str:
@@ -127,7 +132,10 @@ def runner_up(findings: Findings) -> str:
     told = f"{second.get('title') or second.get('effect')}"
     if gain is not None:
         told += f"; by itself it would make the held-out squared error {percent(gain)} smaller"
-    return told + (f", {number(margin)} behind in log-likelihood." if margin is not None else ".")
+    if margin is None:
+        return f"{told}."
+    place = "behind" if margin >= 0 else "ahead of"
+    return f"{told}. In log-likelihood it is {number(abs(margin))} {place} the best of the causes by itself."
 
 
 def titles_of(findings: Findings, output: str) -> dict[str, str]:

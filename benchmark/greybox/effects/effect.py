@@ -211,6 +211,10 @@ class Effect(ABC):
         """Return its numbers as those of the refined law, where that contains it."""
         return None
 
+    def simpler(self, values: np.ndarray, scales: SignalScales) -> Mapping[str, np.ndarray]:
+        """Return the laws with fewer numbers that may do as well as this one with these values, with theirs."""
+        return {name: values[list(shared)] for name, shared in self.contains.items()}
+
     def as_spring(self, stiffness: float, scales: SignalScales) -> tuple[float, ...]:
         """Return numbers with which it pulls back as the linear spring does whose place it takes."""
         raise NotImplementedError

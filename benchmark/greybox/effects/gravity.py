@@ -11,7 +11,7 @@ from simgap.registry import EFFECTS
 from simgap.units import of_motion
 
 
-def _radian(unit: str) -> float:
+def radians_per(unit: str) -> float:
     """Give the unit of an angle in rad; 0 for what is none."""
     motion = of_motion(unit)
     return motion.factor if motion.kind == "angle" else 0.0
@@ -46,7 +46,7 @@ class Gravity(ForceEffect):
 
         A pendulum that swings faster than half the sampling frequency is not seen.
         """
-        radian = _radian(scales.y_unit) or 1.0
+        radian = radians_per(scales.y_unit) or 1.0
         turn = 2 * math.pi / radian
         return (
             Parameter("amplitude", scales.force_unit, 0.0, (math.pi / scales.dt) ** 2 / radian),
@@ -56,7 +56,7 @@ class Gravity(ForceEffect):
 
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from weak to strong, hanging or standing out at angle zero."""
-        radian = _radian(scales.y_unit) or 1.0
+        radian = radians_per(scales.y_unit) or 1.0
         return [
             Start((level * scales.force_rms, angle / radian, radian))
             for level in (0.7, 3.0)
@@ -65,12 +65,12 @@ class Gravity(ForceEffect):
 
     def as_spring(self, stiffness: float, scales: SignalScales) -> tuple[float, ...]:
         """Return the pendulum that hangs at zero and swings as fast."""
-        radian = _radian(scales.y_unit) or 1.0
+        radian = radians_per(scales.y_unit) or 1.0
         return stiffness / radian, 0.0, radian
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is an angle that moves by more than a twelfth of a turn."""
-        return scales.kind == "position" and _radian(scales.y_unit) * scales.x_max > 0.5
+        return scales.kind == "position" and radians_per(scales.y_unit) * scales.x_max > 0.5
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

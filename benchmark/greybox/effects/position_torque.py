@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, final
+
+import numpy as np
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.gravity import radians_per
 from simgap.registry import EFFECTS
 
 MOST_PERIODS = 40  # in a travel
+NEARLY = 0.05  # of a turn, from which a period may differ that is one
 
 
 @EFFECTS.register("position_torque")
@@ -54,6 +59,15 @@ class PositionTorque(ForceEffect):
             for halves in range(3, 2 * MOST_PERIODS + 1)  # of a period
             for phase in (0.0, 1.57)
         ]
+
+    def simpler(self, values: np.ndarray, scales: SignalScales) -> Mapping[str, np.ndarray]:
+        """Return gravity where the force repeats with every turn of an angle."""
+        radian = radians_per(scales.y_unit)
+        amplitude, period, phase = values
+        if abs(radian * period - 2 * math.pi) > NEARLY * 2 * math.pi:
+            return {}
+        hangs = math.remainder(-phase - (math.pi if amplitude > 0 else 0.0), 2 * math.pi)
+        return {"gravity": np.array([abs(amplitude), hangs / radian, radian])}
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the simulation has a position."""
