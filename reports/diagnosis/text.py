@@ -50,7 +50,7 @@ def diagnosis_text(findings: Findings, width: int = 100) -> str:
         paragraphs += _section("An offer to look at, not a finding", [formula, share], width)
     paragraphs += _section("About the data", findings.checks, width)
     if findings.effects:
-        paragraphs += ["", *_wrapped("Ranges in brackets are 95 % intervals where nothing else is said.", width)]
+        paragraphs += ["", *_wrapped(words.of_numbers(findings), width)]
     return "\n".join(paragraphs) + "\n"
 
 

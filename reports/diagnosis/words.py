@@ -123,6 +123,14 @@ def with_effects(findings: Findings) -> str:
     return "with the suspects" if findings.verdict == "suspected" else "with the causes"
 
 
+def of_numbers(findings: Findings) -> str:
+    """Say what ranges are, and what forces are in the units of accelerations."""
+    units = [parameter.unit for cause in findings.effects for parameter in cause.parameters]
+    per_mass = " Forces are per unit of mass or inertia, which these records do not tell."
+    ranges = "Ranges in brackets are 95 % intervals where nothing else is said."
+    return ranges + per_mass * any(unit.endswith("/s^2") for unit in units)
+
+
 def runner_up(findings: Findings) -> str:
     """Say in a sentence which effect was the best that was not named; empty without one."""
     second = findings.runner_up

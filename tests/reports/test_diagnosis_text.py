@@ -50,7 +50,8 @@ Where the squared error of x goes: shares of the plain model's on the test exper
 About the data
   Only 150 training samples: weak effects cannot be told from noise.
 
-Ranges in brackets are 95 % intervals where nothing else is said.
+Ranges in brackets are 95 % intervals where nothing else is said. Forces are per unit of mass or
+inertia, which these records do not tell.
 """
 
 
