@@ -44,7 +44,7 @@ def stop_body(new: list, fast: int, low: float, high: float):
         new[0] = end
 
 
-def one_way_body(new: list, n: int, x: float, most: float, h: float):
+def brake_body(new: list, n: int, x: float, most: float, h: float):
     """Let x, a substep of h seconds ago, return to zero no faster than at the rate `most`."""
     rate = new[1] if n > 1 else (new[0] - x) / h
     kept = rate

@@ -24,7 +24,7 @@ class GreyBoxStep:
         shared = (
             bodies.move_body,
             bodies.stop_body,
-            bodies.one_way_body,
+            bodies.brake_body,
             bodies.flow_out,
             bodies.fill_tanks,
             bodies.spill_tanks,

@@ -159,8 +159,8 @@ class PlantWriter:
         for term, _ in self.forces("stop", x, v, h):
             p = plant.part_of(term).start
             lines.append(f"    stop_body(new, {fast}, {self.of_theta}[{p}], {self.of_theta}[{p + 1}])")
-        for _, call in self.forces("one-way", x, v, h):
-            lines.append(f"    one_way_body(new, {n}, s[{at}], {call}, {h})")
+        for _, call in self.forces("braking", x, v, h):
+            lines.append(f"    brake_body(new, {n}, s[{at}], {call}, {h})")
         return "\n".join([*lines, f"    take(s, {at}, new, {n})", f"    s[{self.before}] = force"])
 
     def _tanks(self) -> str:

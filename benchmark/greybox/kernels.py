@@ -21,7 +21,7 @@ TERM = types.float64(
 )  # fmt: skip
 SLOTS = 5  # force terms that one model may have; the tuple has this length, so that the loop is compiled once
 # In the order of simgap.greybox.effects.effect.Role.
-FORCE, FRICTION, OUTFLOW, RIM, STOP, ONE_WAY = range(6)
+FORCE, FRICTION, OUTFLOW, RIM, STOP, BRAKING = range(6)
 
 _matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
@@ -172,7 +172,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                             # The impact takes the velocity towards the stop and leaves one that is away from it.
                             new1 = min(new1, 0.0) if new0 > end else max(new1, 0.0)
                             new0 = end
-                    for q in range(until[STOP], until[ONE_WAY]):
+                    for q in range(until[STOP], until[BRAKING]):
                         most = terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
                         rate = new1 if n > 1 else (new0 - z0) / h
                         kept = max(rate, -most) if z0 > 0.0 else min(rate, most) if z0 < 0.0 else rate

@@ -139,8 +139,8 @@ def test_friction_that_falls_with_speed_asks_for_more_force_to_start_than_to_go_
 
 @pytest.mark.parametrize("rig", ["cart", "supply"])
 def test_what_cannot_brake_returns_to_zero_no_faster_than_it_coasts_and_rises_as_before(rig):
-    most = physical(rig, {"one_way_drive": 1.0})["one_way_drive"]
-    held, free = (clean(rig, *hidden).reshape(-1, 300) for hidden in (["one_way_drive"], []))
+    most = physical(rig, {"limited_braking": 1.0})["limited_braking"]
+    held, free = (clean(rig, *hidden).reshape(-1, 300) for hidden in (["limited_braking"], []))
     outwards = [np.diff(y, axis=1) * np.sign(y[:, :-1]) / RIGS[rig].dt for y in (held, free)]
     outwards = [rate[(y[:, :-1] * y[:, 1:]) > 0] for rate, y in zip(outwards, (held, free), strict=True)]
     assert outwards[0].min() >= -most * (1 + 1e-9) > 1.5 * outwards[1].min()

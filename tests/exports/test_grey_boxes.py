@@ -88,7 +88,7 @@ def test_the_effects_of_a_model_pass_each_other_in_the_order_of_the_chain(tmp_pa
         ("tanks", ("curved_input", "sqrt_outflow", "overflow", "sensor_saturation")),
         ("tanks", ("finer curved_input", "sqrt_outflow", "overflow", "finer curved_sensor")),
         ("velocity", ("finer inner_saturation", "coulomb_friction")),
-        ("velocity", ("one_way_drive", "quadratic_drag")),
+        ("velocity", ("limited_braking", "quadratic_drag")),
         ("imposed", ("backlash", "coulomb_friction", "hysteresis")),
         ("imposed", ("coulomb_friction", "finer hysteresis")),
         ("position", ("backlash", "finer hysteresis")),

@@ -140,7 +140,7 @@ SECOND = {"load_friction"}
 @pytest.mark.parametrize(
     ("rig", "effect"),
     [(rig, name) for rig in ("cart", "stage") for name in suitable(rig) if name not in ("outliers", "quantisation")]
-    + [("supply", "one_way_drive"), ("tank", "sqrt_outflow"), ("tank", "overflow"), ("tank", "dead_zone")]
+    + [("supply", "limited_braking"), ("tank", "sqrt_outflow"), ("tank", "overflow"), ("tank", "dead_zone")]
     + [("tanks", "sqrt_outflow")],
 )  # fmt: skip
 def test_a_term_is_that_of_an_independent_fine_integration(rig, effect):

@@ -55,11 +55,11 @@ class Page(HTMLParser):
 def test_a_page_says_what_was_found_and_how_sure_it_is(named):
     page = Page(diagnosis_page(named))
     for told in (
-        "The simulation errs because of Coulomb friction (or backlash); with it", "falls by 38 % (33 to 43 %).", "1.24 mm",
-        "0.768 mm", "-38 %", "friction force", "6.84 mm/s^2", "6.71 to 6.97", "These data do not tell it from",
-        "stop and start again in the same direction", "Viscous drag", "Only 150 training samples", "seed 0",
-        "Coulomb friction 61.7 %", "learnable from the input, without a name 13.0 %",
-        "floor: what repeated runs differ by 10.0 %",
+        "The simulation errs because of Coulomb friction (or backlash); with it", "falls by 38 % (33 to 43 %).",
+        "1.24 mm", "0.768 mm", "-38 %", "friction force", "6.84 mm/s^2", "6.71 to 6.97",
+        "These data do not tell it from", "stop and start again in the same direction", "Viscous drag",
+        "Only 150 training samples", "seed 0", "Coulomb friction 61.7 %",
+        "learnable from the input, without a name 13.0 %", "floor: what repeated runs differ by 10.0 %",
     ):  # fmt: skip
         assert told in page.text
 

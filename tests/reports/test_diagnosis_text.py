@@ -167,7 +167,10 @@ def test_an_effect_of_single_experiments_says_that_it_cannot_be_forecast(named):
 def test_causes_are_told_apart_by_channel_where_there_are_several(named):
     drifts = tuple(replace(named.causes[0], title="sensor drift", channel=name) for name in ("x", "v"))
     text = in_one_line(diagnosis_text(replace(named, causes=drifts, units={"x": "mm", "v": "mm/s"})))
-    assert "because of sensor drift (x) (or backlash) and sensor drift (v) (or backlash); with them the free-run error" in text
+    assert (
+        "because of sensor drift (x) (or backlash) and sensor drift (v) (or backlash); with them the free-run error"
+        in text
+    )
 
 
 def test_the_frequency_band_is_named_only_for_want_of_other_views(named):

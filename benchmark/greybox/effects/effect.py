@@ -16,7 +16,7 @@ Port = Literal["input", "force", "output"]
 # What the simulation does with the value of a force term: adds it to the forces; lets dry friction hold up to it; lets
 # so much flow out of a tank on top of its linear outflow; lets the tank overflow above it; stops a body there; or lets
 # the output return to zero no faster.
-Role = Literal["force", "friction", "outflow", "rim", "stop", "one-way"]
+Role = Literal["force", "friction", "outflow", "rim", "stop", "braking"]
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ CATALOGUE = {
     "periodic_disturbance": Hidden("periodic", "L/s^2", 0.8, 50.0, 10.0, 0.06, 0.06),
     "hysteresis": Hidden("hysteresis", "L/s^2 at saturation", 0.6, 50.0, 10.0, None, None),
     "hard_stop": Hidden("stop", "L, each way", None, 4.0, 7.0, None, None, 1.0),
-    "one_way_drive": Hidden("coast", "Y/s back to zero", 0.8, None, None, None, None, None, None, 6e3),
+    "limited_braking": Hidden("coast", "Y/s back to zero", 0.8, None, None, None, None, None, None, 6e3),
     "sqrt_outflow": Hidden("root", "share", None, None, None, 1.0, 1.0),
     "overflow": Hidden("rim", "L", None, None, None, 11.0, 11.0),
     "sensor_drift": Hidden("drift", "Y/s, standard deviation", 0.02, 0.2, 0.15, 0.0025, 0.002),

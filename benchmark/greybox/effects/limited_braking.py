@@ -1,4 +1,4 @@
-"""A drive that pushes and cannot pull back."""
+"""An output that returns to zero no faster than at a certain rate."""
 
 from __future__ import annotations
 
@@ -11,56 +11,52 @@ from simgap.registry import EFFECTS
 SLOW, FREE = (0.25, 0.6), 5.0  # of a large rate: limits that are met, and one that is out of reach
 
 
-@EFFECTS.register("one_way_drive")
+@EFFECTS.register("limited_braking")
 @final
-class OneWayDrive(ForceEffect):
-    """-dx/dt <= max(0, r0 + (r1 - r0) x / X) at x > 0, and the same below zero: it returns only by itself.
+class LimitedBraking(ForceEffect):
+    """-dx/dt <= max(0, r0 + (r1 - r0) x / X) at x > 0, and towards zero from below likewise.
 
     x is the output: of a body its velocity. r0 is how fast it returns near zero, r1 at its largest value X.
     """
 
-    name: ClassVar[str] = "one_way_drive"
-    title: ClassVar[str] = "a drive that cannot brake"
+    name: ClassVar[str] = "limited_braking"
+    title: ClassVar[str] = "limited braking"
     explanation: ClassVar[str] = (
-        "The drive pushes the output away from zero as fast as it can, and cannot pull it back: it returns only as "
-        "fast as load and friction let it. A freewheel, a motor that coasts between pulses, a capacitor behind a "
-        "diode, a vessel behind a check valve."
+        "The output returns towards zero no faster than at a certain rate, whatever the drive asks, and moves away "
+        "from it as before: a motor that coasts between pulses or brakes with a limited current, a car without brakes, "
+        "a freewheel, a capacitor behind a diode, a vessel behind a check valve."
     )
     reference: ClassVar[str] = (
         "Erickson and Maksimovic, Fundamentals of Power Electronics, 2001, ch. 5 (the diode blocks, and the load alone "
         "discharges the capacitor)"
     )
-    role: ClassVar[Role] = "one-way"
+    role: ClassVar[Role] = "braking"
     may_move_poles_of: ClassVar[tuple[str, ...]] = ("velocity", "other")
     shows_in: ClassVar[tuple[ViewName, ...]] = ("rate of change", "velocity", "time since reversal", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "rate_limit": (
-            "switch the drive off altogether: the output returns as before where the drive cannot brake, and at "
-            "another rate behind a slow actuator"
+            "switch the drive off altogether: with limited braking the output returns hardly slower than before, behind "
+            "a slow actuator at another rate"
         ),
         "asymmetric_gain": (
-            "hold each input until the output is steady: a gain that depends on the sign shows there, a drive that "
-            "cannot brake does not"
+            "hold each input until the output is steady: a gain that depends on the sign shows there, limited braking "
+            "does not"
         ),
         "quadratic_drag": (
-            "switch the drive off at several outputs: drag slows a fast motion much more, without brakes a motion "
+            "switch the drive off at several outputs: drag slows a fast motion much more, with limited braking it "
             "rises faster than it falls at every speed"
         ),
         "coulomb_friction": (
-            "raise the input slowly from zero: dry friction holds until it is overcome, a drive that cannot brake "
-            "follows at once"
+            "raise the input slowly from zero: dry friction holds until it is overcome, limited braking changes nothing"
         ),
         "stribeck_friction": (
-            "raise the input slowly from zero: dry friction holds until it is overcome, a drive that cannot brake "
-            "follows at once"
+            "raise the input slowly from zero: dry friction holds until it is overcome, limited braking changes nothing"
         ),
         "load_friction": (
-            "raise the input slowly from zero: friction holds until it is overcome, a drive that cannot brake follows "
-            "at once"
+            "raise the input slowly from zero: friction holds until it is overcome, limited braking changes nothing"
         ),
         "hysteresis": (
-            "repeat a slow triangle at half the speed: a drive that cannot brake then follows either way, hysteresis "
-            "stays as it was"
+            "repeat a slow triangle at half the speed: a slow return needs no brakes, hysteresis stays as it was"
         ),
     }
 
