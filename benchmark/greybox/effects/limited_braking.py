@@ -35,8 +35,8 @@ class LimitedBraking(ForceEffect):
     shows_in: ClassVar[tuple[ViewName, ...]] = ("rate of change", "velocity", "time since reversal", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
         "rate_limit": (
-            "switch the drive off altogether: with limited braking the output returns hardly slower than before, behind "
-            "a slow actuator at another rate"
+            "switch the drive off altogether: with limited braking the output returns hardly slower than before, "
+            "behind a slow actuator at another rate"
         ),
         "asymmetric_gain": (
             "hold each input until the output is steady: a gain that depends on the sign shows there, limited braking "
