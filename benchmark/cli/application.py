@@ -39,20 +39,25 @@ PLAIN = {
 }
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command("run")(run.run)
-app.command("report")(report.report)
-app.command("list")(catalogue.show)
-app.command("diagnose")(diagnose.diagnose)
-app.command("open")(opening.open_page)
-app.command("next")(next_command.next_record)
-app.command("fit")(fit.fit)
-app.command("simulate")(simulate.simulate)
-app.command("export")(export.export)
-app.command("tune")(tune.tune)
-app.command("range-test")(range_test.range_test)
-app.command("check")(check.check)
-app.command("new-model")(new_model.new_model)
-app.command("try-model")(try_model.try_model)
+# In a list of commands a help of one line; that of the command itself says more.
+COMMANDS = {
+    "run": (run.run, "Fit models to data sets and score their free runs."),
+    "report": (report.report, "Show stored results; write a leaderboard and a site."),
+    "list": (catalogue.show, "List models, data sets, effects or suites."),
+    "diagnose": (diagnose.diagnose, "Name what a simulation lacks, and measure the gain."),
+    "open": (opening.open_page, "Diagnose a record in the browser."),
+    "next": (next_command.next_record, "Design the record to take next."),
+    "fit": (fit.fit, "Fit one model and say how well it simulates."),
+    "simulate": (simulate.simulate, "Let a saved model run free over a record."),
+    "export": (export.export, "Write a model for C, Python, FMI, ONNX and others."),
+    "tune": (tune.tune, "Search the settings of a model."),
+    "range-test": (range_test.range_test, "Show where a network's loss begins to fall."),
+    "check": (check.check, "Compare results with a reference."),
+    "new-model": (new_model.new_model, "Write a working model to change into your own."),
+    "try-model": (try_model.try_model, "Say whether a model keeps its contract."),
+}
+for name, (command, says) in COMMANDS.items():
+    app.command(name, short_help=says)(command)
 app.add_typer(data.app, name="data")
 app.add_typer(recovery.app, name="recovery")
 
