@@ -238,6 +238,7 @@ def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term
         return min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
     if term.effect.replaces_spring and plant.order == 2 and (stiffness := estimate.theta[1]) > 0:
         theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+        assert plant.scales is not None
         theta[plant.part_of(term)] = term.effect.as_spring(stiffness, plant.scales.of(term))
         fit = min(fit, baseline.fit(plant.terms, [(theta, local)], max_steps), key=lambda fit: fit.squares)
     far_off = fit.squares >= STOOD_IN * baseline.estimate.squares
