@@ -95,7 +95,7 @@ class Plant:
             return True
         if not isinstance(effect, InputEffect) or not self.machine.controlled:
             known = bool(self.machine.known.gravity) and effect.replaces_spring
-            return not known and not effect.own
+            return not known and not effect.own and effect.role != "braking"
         return effect.on_command if channel == self.nu else effect.on_goal
 
     @property

@@ -31,6 +31,7 @@ class LimitedBraking(ForceEffect):
         "discharges the capacitor)"
     )
     role: ClassVar[Role] = "braking"
+    of_one_mass: ClassVar[bool] = True
     may_move_poles_of: ClassVar[tuple[str, ...]] = ("velocity", "other")
     shows_in: ClassVar[tuple[ViewName, ...]] = ("rate of change", "velocity", "time since reversal", "amplitude")
     confounders: ClassVar[dict[str, str]] = {
@@ -78,7 +79,9 @@ class LimitedBraking(ForceEffect):
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the output is a velocity, or no motion at all."""
-        return (scales.kind == "other" or (scales.kind == "velocity" and scales.order == 1)) and _rate(scales) > 0
+        return _rate(scales) > 0 and (
+            scales.order == 1 if scales.kind == "velocity" else scales.kind == "other" and scales.order > 0
+        )
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
