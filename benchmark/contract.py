@@ -227,14 +227,14 @@ class CheckResult:
 
 
 def examine(candidate: Candidate) -> Iterator[CheckResult]:
-    """Run the checks one after the other; a model that cannot even be fitted is not asked for more."""
+    """Run the checks one after the other; a model that cannot be fitted is not asked for more than a docstring."""
     for check in CHECKS:
         sentence = check.__name__.replace("_", " ")
         try:
             check(candidate)
         except (ModelFault, UnusableInput) as error:
             yield CheckResult(sentence, str(error))
-            if "fitted" not in candidate.__dict__:
+            if check is not it_has_a_docstring and "fitted" not in candidate.__dict__:
                 return
         else:
             yield CheckResult(sentence)

@@ -70,7 +70,8 @@ def load(
     is split in time 60/20/20. A folder without a dataset.toml holds such files with the same columns, one record in
     the order of their names; a list is one in its own order. `kind` says what the outputs are, {"speed": "velocity"},
     or the kind of a single output.
-    `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap.
+    `resample` interpolates onto an even grid of that many seconds, `split_gaps` starts a new experiment at each gap and
+    after missing cells. A time column that is too coarse for `dt` is ignored.
     `known` is what a table [plant] of a dataset.toml says of the machine, {"mass": "0.5 kg"}.
     Raises UnusableInput when the data cannot be used, and its subclass Missing when they are not at hand.
     """

@@ -76,10 +76,10 @@ def assemble(
     n_init = default_n_init(every) if n_init is None else n_init
     for experiment in every:
         if len(experiment) <= n_init:
-            raise UnusableInput(
-                f"{source}: experiment {experiment.name} has {len(experiment)} rows, no more than the "
-                f"{n_init} (n_init) that start a simulation; record longer experiments or lower n_init"
-            )
+            rows = f"{len(experiment)} row{'' if len(experiment) == 1 else 's'}"
+            why = f"experiment {experiment.name} has {rows}, no more than the {n_init} (n_init) that start a simulation"
+            help_ = "record more samples" if n_init == 1 else "record longer experiments or lower n_init"
+            raise UnusableInput(f"{source}: {why}; {help_}")
     _check_that_all_move(train, channels, source)
     return Dataset(name, TrainingSet(train, valid, n_init, channels), test, n_init, channels)
 

@@ -16,7 +16,7 @@ from simgap.data.formats.logs import is_described
 from simgap.data.formats.one_record import Choices
 from simgap.data.formats.plant_table import parse_known, with_known
 from simgap.data.formats.sampling import sampling_time
-from simgap.data.formats.tables import Table
+from simgap.data.formats.tables import Table, missing_in
 from simgap.data.kinds import kind_of, with_kinds
 from simgap.data.loading import Reading, read, read_tables
 from simgap.records import Channel, Channels, Dataset, UnusableInput
@@ -131,12 +131,12 @@ def _of_logs(tables: Sequence[Table]) -> Look:
         if time is not None and i == table.index(time):
             continue
         try:
-            column, values = _column(table, heading)
+            column, there, values = _column(table, heading)
         except UnusableInput as problem:
             columns.append(Column(heading, heading, problem=str(problem)))
             continue
         columns.append(column)
-        curves.append(_curve(heading, t, values))
+        curves.append(_curve(heading, t[there], values))
     left_out = len(table.names) - MOST
     about = [f"{len(tables)} logs; shown is {Path(table.source).name}"] if len(tables) > 1 else []
     about += [f"{left_out} more columns are not shown"] if left_out > 0 else []
@@ -156,11 +156,13 @@ def _time(table: Table, column: str | None) -> tuple[Clock | None, float | None,
     return None, None, ""
 
 
-def _column(table: Table, heading: str) -> tuple[Column, np.ndarray]:
-    values, known = table.numbers(heading), table.heading(heading)
+def _column(table: Table, heading: str) -> tuple[Column, np.ndarray, np.ndarray]:
+    """Look at a column; with the rows in which there is a number, and these numbers."""
+    there = np.flatnonzero(~missing_in(table.cells_of(heading)))
+    values, known = (table.only(there) if there.size else table).numbers(heading), table.heading(heading)
     kind = kind_of(known.name, known.unit) or ""
     low, high = float(values.min()), float(values.max())
-    return Column(heading, known.name, known.unit, _role(known.name, kind), kind, low, high), values
+    return Column(heading, known.name, known.unit, _role(known.name, kind), kind, low, high), there, values
 
 
 def _role(name: str, kind: str) -> Role:

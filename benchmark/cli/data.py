@@ -25,7 +25,7 @@ app = typer.Typer(help="Make, fetch and check data sets.", rich_markup_mode=None
 Name = Annotated[str, typer.Argument(help="Name of a registered data set.")]
 
 
-@app.command()
+@app.command(short_help="Write a registered data set as a folder.")
 def make(
     name: Name,
     out: Annotated[Path | None, typer.Option(help="Folder to write; the data set's name by default.")] = None,
@@ -46,7 +46,7 @@ def fetch(name: Name) -> None:
     typer.echo(f"{name} is in {simgap.data.fetch(name)}")
 
 
-@app.command()
+@app.command(short_help="Say what a data set holds, or why it is refused.")
 def check(
     name: Data,
     inputs: Inputs = None,
@@ -72,6 +72,11 @@ def check(
             low, high, unit = channel["low"], channel["high"], channel["unit"]
             about = f"  {role[:-1]:6} {channel['name']}: {low:.4g} to {high:.4g} {unit} ({channel['kind']})"
             if role == "inputs":
-                trained = described["splits"]["train"]["experiments"]
-                about += f", white in {channel['white_experiments']} of {trained} training experiments"
+                about += f", {_whiteness(channel['white_experiments'], described['splits']['train']['experiments'])}"
             typer.echo(about)
+
+
+def _whiteness(white: int, trained: int) -> str:
+    if not white:
+        return "not white in any training experiment"
+    return f"white in {white} of {trained} training experiment{'' if trained == 1 else 's'}"

@@ -21,11 +21,14 @@ from simgap.cli.options import (
 )
 from simgap.records import UnusableInput
 
+# Those of simgap.exports, which help should not wait for.
+FORMATS = ("c", "control", "fmu", "gymnasium", "mjcf", "onnx", "python", "urdf")
+
 
 def export(
     model: Annotated[str | None, typer.Argument(help="A saved model, or the name of one that is fitted first.")] = None,
     data: Annotated[str | None, typer.Argument(help="Name of a data set, a folder or a CSV file.")] = None,
-    to: Annotated[str | None, typer.Option(help="The format, such as c or fmu.")] = None,
+    to: Annotated[str | None, typer.Option(help=f"The format: {', '.join(FORMATS)}.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write into this new folder.")] = None,
     check: Annotated[Path | None, typer.Option("--verify", help="Run the export in this folder once more.")] = None,
     experiment: Annotated[str | None, typer.Option(help="The experiment that becomes the record.")] = None,

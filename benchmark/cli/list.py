@@ -71,6 +71,7 @@ def _effects() -> list[dict[str, str]]:
 
 
 def _suites() -> list[dict[str, str]]:
-    from simgap.running.suites import load_suite, suite_names
+    from simgap.running.suites import STUDY, STUDY_TITLE, load_suite, suite_names
 
-    return [{"name": name, "title": load_suite(name).title, "missing": ""} for name in suite_names()]
+    titles = {name: load_suite(name).title for name in suite_names()} | {STUDY: STUDY_TITLE}
+    return [{"name": name, "title": title, "missing": ""} for name, title in titles.items()]

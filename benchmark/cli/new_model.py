@@ -35,4 +35,4 @@ def new_model(
     file.write_text(text, encoding="utf-8")
     typer.echo(f"{file} holds a model that works. Change it, then:")
     typer.echo(f"  simgap try-model {file}")
-    typer.echo(f"  simgap run smoke --model {file}:{kind} && simgap report")
+    typer.echo(f"  simgap run smoke --model {file}:{kind} --models arx --out my_results")

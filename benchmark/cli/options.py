@@ -37,7 +37,9 @@ KnownOf = Annotated[
     list[str] | None,
     typer.Option("--known", help="What is known of the machine: mass=0.5kg, arm=0.1m, controller.goal=r; repeatable."),
 ]
-SplitGaps = Annotated[bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time.")]
+SplitGaps = Annotated[
+    bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time and after missing cells.")
+]
 Json = Annotated[Path | None, typer.Option("--json", help="Write the same as JSON into this file.")]
 
 

@@ -67,7 +67,7 @@ def make(
     typer.echo(f"Cases in {out}: {len(made)}. Only the seed tells what is hidden in them.")
 
 
-@app.command()
+@app.command(short_help="Let a tool name what is hidden.")
 def answer(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of cases.")],
     out: Annotated[Path, typer.Option(help="File of the answers; what it holds already is kept.")] = Path(
@@ -92,7 +92,7 @@ def answer(
     typer.echo(f"{len(answers)} answers of {tool} are in {out}; {failed} say that it failed")
 
 
-@app.command()
+@app.command(short_help="Count right and invented names.")
 def score(
     files: Annotated[list[Path], typer.Argument(metavar="ANSWERS.json ..", help="Files of answers, one per tool.")],
     seed: Annotated[str, typer.Option(help="The seed that the cases were made with.")],

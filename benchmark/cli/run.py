@@ -18,7 +18,7 @@ FAILED = ("error", "timeout")
 
 
 def run(
-    suite: Annotated[str, typer.Argument(help="Name of a suite, or path of a .toml file.")] = "full",
+    suite: Annotated[str, typer.Argument(help="Name of a suite, path of a .toml file, or recovery.")] = "full",
     models: Annotated[str | None, typer.Option(help="Only these models: a,b.")] = None,
     model: Annotated[list[str] | None, typer.Option(help="path/to/file.py:Class; repeatable.")] = None,
     datasets: Annotated[str | None, typer.Option(help="Only these data sets, names or paths: x,y.")] = None,
@@ -36,10 +36,12 @@ def run(
 ) -> None:
     """Fit models to data sets and score their free-run simulation; a second run carries on.
 
-    The suite recovery instead hides physical effects in simulated rigs (--datasets names them) and counts how often
-    `simgap diagnose` names them.
+    `simgap run recovery` is a study instead: it hides physical effects in simulated rigs (--datasets names those) and
+    counts how often `simgap diagnose` names them.
     """
-    if suite == "recovery":
+    from simgap.running.suites import STUDY
+
+    if suite == STUDY:
         from simgap.cli import recovery
 
         refused = {"models": models, "model": model, "input": inputs, "output": outputs, "dt": dt,

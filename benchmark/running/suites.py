@@ -13,6 +13,8 @@ from simgap.registry import DATASETS, MODELS, Registry
 from simgap.tasks import TASKS, USUAL
 
 FOLDER = Path(__file__).parent / "suites"
+STUDY = "recovery"  # what `simgap run` takes beside the suites: it has rigs and effects, no models
+STUDY_TITLE = "How often a diagnosis names the effects that are hidden in simulated rigs"
 KEYS = (
     "title", "datasets", "without", "models", "without_models", "groups", "tasks", "seeds", "timeout", "memory",
 )  # fmt: skip
@@ -59,9 +61,11 @@ def load_suite(name: str) -> Suite:
 
     Paths inside a suite file count from where the file lies. Raises UnusableInput.
     """
+    if name == STUDY:
+        raise UnusableInput(f"{STUDY} is a study and no suite of models; `simgap run {STUDY}` runs it")
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not path.is_file():
-        known = ", ".join(suite_names())
+        known = ", ".join([*suite_names(), STUDY])
         raise UnusableInput(f"there is no suite {name!r}; known are {known}, or give the path of a .toml file")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import safetensors.numpy
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 
 from simgap.protocol import Model
 from simgap.records import Channel, Channels, Dataset, UnusableInput
@@ -104,6 +104,8 @@ def read_saved(file: str | Path) -> SavedModel:
         return SavedModel(about["model"], decode_model(about, arrays), FittedOn.read(about["fitted_on"]))
     except UnusableInput:
         raise
+    except SafetensorError as error:  # its words are about headers
+        raise UnusableInput(f"{file} is no saved model; give a file that --save of fit or diagnose wrote") from error
     except Exception as error:  # a model that is built of what is none may raise anything
         raise UnusableInput(
             f"{file} is no saved model, such as --save of fit and diagnose writes: {_one_line(error)}"

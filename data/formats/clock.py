@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int64
 
 from simgap.data.formats.headings import time_unit
-from simgap.data.formats.tables import BadCell, Table
+from simgap.data.formats.tables import BadCell, Table, is_missing
 from simgap.records import UnusableInput
 from simgap.units import seconds_in
 
@@ -21,6 +21,7 @@ DATE = re.compile(r"\s*\d{1,4}[-./:]\d{1,2}[-./:]\d|\s*\d{1,2}:\d\d")
 YEAR_FIRST = re.compile(r"(\d{4})/(\d\d)/(\d\d)")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})")
 TIME_OF_DAY = re.compile(r"\s*\d{1,2}:\d\d:")
+DATES, TIMES_OF_DAY = "dates", "times of day"
 MICROSECOND = timedelta(microseconds=1)
 DAY = timedelta(days=1) // MICROSECOND
 # Numbers without a unit that lie within the years 2000 to 2100 when they count milliseconds since 1970: no record in
@@ -37,9 +38,19 @@ class Clock:
     seconds: Float[np.ndarray, " T"]
     counts: str = ""
 
+    @property
+    def is_dated(self) -> bool:
+        """Tell whether the column holds dates or times of day."""
+        return self.counts in (DATES, TIMES_OF_DAY)
+
+    @property
+    def unit(self) -> str:
+        """What stands behind a time that is shown."""
+        return "" if self.is_dated else " s"
+
     def shown(self, index: int) -> str:
         """Write the time of a row for a message: dates as they stand there, numbers in seconds."""
-        if self.counts == "dates":
+        if self.is_dated:
             cells = self.table.cells_of(self.column)
             return str(getattr(cells, "iloc", cells)[index]).strip()
         return f"{self.seconds[index]:.9g}"
@@ -57,14 +68,15 @@ def read_clock(table: Table, column: str) -> Clock:
     kind = getattr(getattr(cells, "dtype", None), "kind", "")
     try:
         if kind == "M":  # dates of pandas
-            return Clock(table, column, _since_first(_whole_microseconds(cells)), "dates")
+            return Clock(table, column, _since_first(_whole_microseconds(cells)), DATES)
         texts = list(cells) if kind in ("", "O", "T") else []
         if texts and isinstance(texts[0], str) and DATE.match(texts[0]):
-            return Clock(table, column, _since_first(_stamps(texts)), "dates")
+            holds = TIMES_OF_DAY if TIME_OF_DAY.match(texts[0]) else DATES
+            return Clock(table, column, _since_first(_stamps(texts)), holds)
         if texts and isinstance(texts[0], datetime):
-            return Clock(table, column, _since_first(_stamps(list(map(str, texts)))), "dates")
+            return Clock(table, column, _since_first(_stamps(list(map(str, texts)))), DATES)
     except BadCell as bad:
-        raise table.refuse(bad.index, column, bad.why) from None
+        raise table.refuse_cell(bad, column) from None
     return _counted(table, column, table.numbers(column))
 
 
@@ -86,7 +98,7 @@ def _counted(table: Table, column: str, t: Float[np.ndarray, " T"]) -> Clock:
 def _whole_microseconds(cells: Any) -> Int64[np.ndarray, " T"]:
     missing = np.flatnonzero(cells.isna().to_numpy())
     if missing.size:
-        raise BadCell(int(missing[0]), "the time is missing; fill it in or end the record at the row before")
+        raise BadCell(int(missing[0]), "the time is missing", missing=True)
     naive = cells.dt.tz_convert("UTC").dt.tz_localize(None) if cells.dt.tz is not None else cells
     return naive.to_numpy().astype("datetime64[us]").astype(np.int64)
 
@@ -113,6 +125,8 @@ def _stamps(cells: Sequence[str]) -> Int64[np.ndarray, " T"]:
 
 
 def _stamp(index: int, cell: str) -> datetime:
+    if is_missing(cell):
+        raise BadCell(index, "the time is missing", missing=True)
     text = DAY_FIRST.sub(lambda day: f"{day[3]}-{int(day[2]):02d}-{int(day[1]):02d}", cell.strip())
     text = YEAR_FIRST.sub(r"\1-\2-\3", text)
     try:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.data.formats.clock import Clock
-from simgap.data.formats.sampling import GAP, check_clock, check_steps, rounded, usual_step
+from simgap.data.formats.sampling import GAP, check_even, check_order, check_steps, refuse_step, rounded, usual_step
 from simgap.data.formats.tables import Table
 from simgap.records import Experiment, UnusableInput
 
@@ -22,21 +22,22 @@ COARSER = 1.5  # usual steps from which on a sample stands for several rows, so 
 
 def pieces_of(
     table: Table, clock: Clock, inputs: Sequence[str], outputs: Sequence[str], dt: float | None,
-    resample: float | None, split_gaps: bool,
+    resample: float | None, split_gaps: bool, left_out: int = 0,
 ) -> tuple[tuple[Experiment, ...], tuple[str, ...]]:  # fmt: skip
-    """Cut a record at its gaps, put it onto an even grid, or both; with what was done, in words.
+    """Cut a record at its gaps and where rows were left out, put it onto an even grid, or both; and say so in words.
 
     Raises UnusableInput where time stands still, and for what the options do not cover.
     """
+    check_order(clock)
     u = np.column_stack([table.numbers(column) for column in inputs])  # [T, nu]
     y = np.column_stack([table.numbers(column) for column in outputs])  # [T, ny]
     usual = dt or _positive(clock)
     widest = max(GAP_IN_UNEVEN_TIME * usual, GAP * resample) if resample else GAP * usual
-    parts, said = _parts(clock, widest) if split_gaps else ([slice(0, len(u))], [])
+    parts, said = _parts(clock, widest, left_out) if split_gaps else ([slice(0, len(u))], [])
     if resample is None:
         step = dt or _common_step(clock, parts)
         for part in parts:
-            check_clock(_part(clock, part), step)
+            check_even(_part(clock, part), step)
         made = [(u[part], y[part]) for part in parts]
     else:
         step, made, interpolated = resample, [], 0
@@ -72,29 +73,36 @@ def _positive(clock: Clock) -> float:
     return usual
 
 
-def _parts(clock: Clock, widest: float) -> tuple[list[slice], list[str]]:
+def _parts(clock: Clock, widest: float, left_out: int) -> tuple[list[slice], list[str]]:
+    """Part the rows at gaps and where rows were left out; with how many pieces and cuts there are, in words."""
     steps = np.diff(clock.seconds)
-    cuts = [0, *(np.flatnonzero((steps < 0) | (steps > widest)) + 1).tolist(), len(clock.seconds)]
+    skips = np.diff(clock.table.rows) > 1 if clock.table.rows is not None else np.zeros(len(steps), bool)
+    gaps = ((steps < 0) | (steps > widest)) & ~skips
+    cuts = [0, *(np.flatnonzero(gaps | skips) + 1).tolist(), len(clock.seconds)]
     every = [slice(a, b) for a, b in pairwise(cuts)]
     kept = [part for part in every if part.stop - part.start >= SHORTEST_PIECE]
     if not kept:
-        raise UnusableInput(
-            f"{clock.table.source}: between its gaps no piece has {SHORTEST_PIECE} rows; record without gaps"
-        )
-    said = [f"{len(every)} experiments of one file, cut at {len(every) - 1} gaps in column {clock.column}"]
+        where = "missing cells and gaps" if left_out else "gaps"
+        help_ = "fill the cells in, or record without gaps" if left_out else "record without gaps"
+        raise UnusableInput(f"{clock.table.source}: between its {where} no piece has {SHORTEST_PIECE} rows; {help_}")
+    there = f" in column {clock.column}" if clock.column else ""
+    where = [counted(int(gaps.sum()), "gap") + there] if gaps.any() or not left_out else []
+    where += [counted(left_out, "row") + " with missing cells"] if left_out else []
+    said = [f"{counted(len(every), 'experiment')} of one file, cut at {' and at '.join(where)}"]
     if short := len(every) - len(kept):
         rows = sum(part.stop - part.start for part in every) - sum(part.stop - part.start for part in kept)
-        said.append(f"{short} of them of fewer than {SHORTEST_PIECE} rows left out, {rows} rows in all")
+        said.append(f"{short} of them of fewer than {SHORTEST_PIECE} rows left out, {counted(rows, 'row')} in all")
     return kept, said
 
 
+def counted(number: int, what: str) -> str:
+    """Write how many there are of something: 1 gap, 2 gaps."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def _part(clock: Clock, part: slice) -> Clock:
-    """Cut a clock; its rows and cells keep their numbers in the file."""
-    table = clock.table
-    cells = tuple(getattr(column, "iloc", column)[part] for column in table.cells)
-    rows = Table(table.source, table.names, cells, table.first_row + part.start, table.parse, table.header_row,
-                 table.layout)  # fmt: skip
-    return Clock(rows, clock.column, clock.seconds[part], clock.counts)
+    """Cut a clock; its rows keep their numbers in the file."""
+    return Clock(clock.table.only(part), clock.column, clock.seconds[part], clock.counts)
 
 
 def _common_step(clock: Clock, parts: Sequence[slice]) -> float:
@@ -111,7 +119,7 @@ def _check_bridges(clock: Clock, widest: float) -> None:
         if wrong.size:
             i = int(wrong[0])
             if steps[i] <= 0:
-                check_steps(_part(clock, slice(i, i + 2)), widest)
+                raise refuse_step(clock, i, widest)
             why = f"time goes from {clock.shown(i)} to {clock.shown(i + 1)}, too far to interpolate"
             remedy = "--split-gaps starts a new experiment there (split_gaps=True in Python)"
             raise clock.table.refuse(i + 1, clock.column, f"{why}; {remedy}")

@@ -54,7 +54,7 @@ def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:
             pieces.append(
                 replace(x, name=name if len(record.pieces) == 1 else f"{name}_{x.name}", dt=first.pieces[0].dt)
             )
-    said = f"{len(tables)} logs, parted 60/20/20 in this order: {', '.join(names[:3])}{', ..' if names[3:] else ''}"
+    said = f"{len(tables)} logs, split 60/20/20 in this order: {', '.join(names[:3])}{', ..' if names[3:] else ''}"
     folder = Path(os.path.abspath(tables[0].source)).parent  # noqa: PTH100  # which keeps the name of a link
     return OneRecord(str(folder), tuple(pieces), first.channels, (said, *first.said))
 

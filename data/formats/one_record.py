@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from simgap.data.formats.clock import Clock, read_clock, time_column
 from simgap.data.formats.description import check_columns
-from simgap.data.formats.gaps import pieces_of
+from simgap.data.formats.gaps import SHORTEST_PIECE, pieces_of
 from simgap.data.formats.headings import heading_of, listed, time_unit
-from simgap.data.formats.sampling import check_clock, sampling_time
-from simgap.data.formats.tables import Table
+from simgap.data.formats.sampling import check_clock, check_coarse, is_coarse, sampling_time
+from simgap.data.formats.tables import Table, missing_in
 from simgap.data.kinds import kind_of
 from simgap.data.splits import assemble, split_in_time, split_pieces
 from simgap.records import LARGEST_VALUE, Channel, Channels, Dataset, Experiment, UnusableInput
 
+BEGIN_ANEW = "fill it in, or --split-gaps begins a new experiment after it (split_gaps=True in Python)"
 SEPARATED = {",": "", ";": "semicolons between cells", "\t": "tabs between cells"}
 
 
@@ -57,14 +60,43 @@ def record_of(table: Table, choices: Choices) -> OneRecord:
     check_columns((*inputs, *outputs), table.source)
     channels = _channels(table, inputs, outputs)
     time = time_column(table, set(columns))
-    clock = None if time is None else read_clock(table, time)
-    if clock is not None and (choices.resample is not None or choices.split_gaps):
-        pieces, said = pieces_of(table, clock, inputs, outputs, choices.dt, choices.resample, choices.split_gaps)
+    whole = table if choices.split_gaps else replace(table, if_missing=BEGIN_ANEW)
+    table = _without_missing(whole, [*inputs, *outputs, *([time] if time else [])]) if choices.split_gaps else whole
+    clock, ignored = _clock_of(table, time, choices.dt)
+    used = _clock_of_rows(table, choices.dt) if clock is None and choices.dt and choices.split_gaps else clock
+    if used is not None and (choices.resample is not None or choices.split_gaps):
+        left_out = len(whole) - len(table)
+        pieces, said = pieces_of(
+            table, used, inputs, outputs, choices.dt, choices.resample, choices.split_gaps, left_out
+        )
     else:
         step = _sampling_time(table, clock, choices)
         pieces, said = (table.experiment("record", inputs, outputs, step),), ()
-    said = _told(table, clock, channels, pieces[0].dt, choices, said)
+    said = _told(table, clock, channels, pieces[0].dt, choices, (*ignored, *said))
     return OneRecord(table.source, tuple(pieces), channels, said)
+
+
+def _without_missing(table: Table, columns: Sequence[str]) -> Table:
+    """Leave out the rows in which one of these columns has no value, unless next to nothing would be left."""
+    missing = np.logical_or.reduce([missing_in(table.cells_of(column)) for column in columns])
+    enough = len(table) - np.sum(missing) >= SHORTEST_PIECE
+    return table.only(np.flatnonzero(~missing)) if missing.any() and enough else table
+
+
+def _clock_of(table: Table, time: str | None, dt: float | None) -> tuple[Clock | None, tuple[str, ...]]:
+    """Read the time column; with a given sampling time a clock that is too coarse for it is ignored, in words."""
+    if time is None:
+        return None, ()
+    clock = read_clock(table, time)
+    if dt is None or not is_coarse(clock):
+        return clock, ()
+    check_coarse(clock, dt)
+    return None, (f"column {table.heading(time).name} ignored, a clock too coarse for steps of {dt:g} s",)
+
+
+def _clock_of_rows(table: Table, dt: float) -> Clock:
+    """Take the time of each row from its place in the file."""
+    return Clock(table, "", dt * (np.arange(len(table)) if table.rows is None else table.rows))
 
 
 def _check(table: Table, choices: Choices) -> None:
@@ -137,7 +169,7 @@ def _told(
     units |= any(channel.kind_from == "header" for channel in channels.outputs)
     slow = clock is not None and dt >= 1 and not clock.counts and not table.heading(clock.column).unit
     if clock is not None and (about or said or units or clock.counts or slow or clock.column not in ("t", "time")):
-        counts = f", which counts {clock.counts}" if clock.counts else ""
+        counts = f", which {'holds' if clock.is_dated else 'counts'} {clock.counts}" if clock.counts else ""
         counts = (
             f", taken for seconds because its heading says no unit, such as '{clock.column} [ms]'" if slow else counts
         )

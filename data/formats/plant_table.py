@@ -20,6 +20,8 @@ KEYS = ("input", "mass", "arm", "inertia", "area", "damping", "supply", "enabled
 CONTROLLER_KEYS = ("goal", "gain", "derivative")
 INTERVAL_KEYS = ("value", "low", "high")
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
+IN_FILE, AS_OPTION = "[plant]", "--known"  # where a person wrote the table
+MOVING = ("position", "velocity", "level")  # kinds of outputs that a machine moves
 STANDARD_GRAVITY = 9.80665
 TICKS = ("tick", "ticks", "count", "counts")
 # What a unit is worth in SI. A quantity without a unit is in SI already.
@@ -34,16 +36,20 @@ UNITS = {
 }
 
 
-def read_plant(table: Any, channels: Channels, where: str) -> KnownPlant:
-    """Read a table of what is known; `where` begins the sentence of an UnusableInput."""
-    where = f"{where}: [plant]"
+def read_plant(table: Any, channels: Channels, where: str, called: str = IN_FILE) -> KnownPlant:
+    """Read a table of what is known; `where`, and what it is called there, begin the sentence of an UnusableInput."""
+    where = f"{where}: {called}"
     _check_table(table, KEYS, where)
     inputs, output = [channel.name for channel in channels.inputs], channels.outputs[0]
-    if len(channels.outputs) != 1 or output.kind not in ("position", "velocity", "level"):
-        raise UnusableInput(
-            f"{where} needs a single output whose kind is position, velocity or level; "
-            f"give {short(output.name)} its kind, or leave the table out"
-        )
+    if len(channels.outputs) != 1 or output.kind not in MOVING:
+        remedy = f"give {short(output.name)} its kind, or leave the table out"
+        if called == AS_OPTION:
+            kind = f"{output.name}=velocity"
+            kind = f'"{kind}"' if " " in kind else kind
+            remedy = f"add --kind {kind}, or position or level (kind=.. in Python), or leave {called} out"
+        if len(channels.outputs) != 1:
+            remedy = f"there are {', '.join(short(channel.name) for channel in channels.outputs)}; name one of them"
+        raise UnusableInput(f"{where} needs a single output whose kind is position, velocity or level; {remedy}")
     controller = table.get("controller")
     used: list[str] = []
 
@@ -103,7 +109,9 @@ def _drive(table: Mapping[str, Any], inputs: Sequence[str], used: list[str], whe
     return drive
 
 
-def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels: Channels, where: str) -> None:
+def check_records(
+    plant: KnownPlant, experiments: Sequence[Experiment], channels: Channels, where: str, called: str = IN_FILE
+) -> None:
     """Refuse columns that cannot be what the table says they are. Raises UnusableInput."""
     names = [channel.name for channel in channels.inputs]
     for key in ("mass", "arm", "inertia"):
@@ -114,13 +122,13 @@ def check_records(plant: KnownPlant, experiments: Sequence[Experiment], channels
             if np.ptp(values) > 0 or values[0] <= 0:
                 what = "changes" if np.ptp(values) > 0 else f"is {values[0]:g}"
                 raise UnusableInput(
-                    f"{where}: [plant]: the column {short(column)} {what} in {x.name}; "
+                    f"{where}: {called}: the column {short(column)} {what} in {x.name}; "
                     f"{key} must be one positive number in each experiment"
                 )
     for x in experiments if plant.enabled else ():
         if not np.isin(x.u[:, names.index(plant.enabled)], (0.0, 1.0)).all():
             raise UnusableInput(
-                f"{where}: [plant]: the column {short(plant.enabled)} of {x.name} must hold 0 (off) and 1 (on) only"
+                f"{where}: {called}: the column {short(plant.enabled)} of {x.name} must hold 0 (off) and 1 (on) only"
             )
 
 
@@ -128,10 +136,10 @@ def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
     """Say of a data set what is known of its machine, as a table [plant] would. Raises UnusableInput."""
     if not table:
         return dataset
-    plant = read_plant(table, dataset.channels, dataset.name)
+    plant = read_plant(table, dataset.channels, dataset.name, AS_OPTION)
     channels = replace(dataset.channels, plant=plant)
     training = dataset.training
-    check_records(plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name)
+    check_records(plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name, AS_OPTION)
     return replace(dataset, training=replace(training, channels=channels), channels=channels)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -13,11 +14,13 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.data.formats.layout import LINE, NUMBER, Layout, layout_of
-from simgap.data.formats.tables import BadCell, Table
+from simgap.data.formats.tables import CORRECT, BadCell, Table, is_missing
 from simgap.records import UnusableInput
 
 # What a decimal number is made of. float() alone would also take 1_000, nan, inf and foreign digits.
 NUMBER_CHARACTERS = frozenset("0123456789+-.eE ")
+# A quoted cell with blanks behind it, which the csv module takes for a fault.
+BLANKS_AFTER_QUOTE = re.compile(r'((?:\A|[\t;,\r\n])[ ]*"(?:[^"\r\n]|"")*")[ ]+(?=[\t;,\r\n]|\Z)')
 LONGEST_PREAMBLE = 100  # lines above the names of the columns that are looked through
 NOT_THE_NAMES = (
     "is taken for the names of the columns, but the rows below do not fit them; begin each line above the names "
@@ -41,11 +44,13 @@ def strict_table(path: Path, content: bytes) -> Table:
         raise UnusableInput(
             f"{path}: row {header} holds numbers where the columns are named; put a line of names above"
         )
-    if len(names) == 1 and (mark := next((mark for mark in "| " if mark in names[0]), "")):
+    if len(names) == 1 and set(names[0]) & set("| "):
         if any(len(row) > 1 for row in islice(rows, LONGEST_PREAMBLE)):
             raise UnusableInput(f"{path}: row {header} {NOT_THE_NAMES}")
-        why = f"is one column, or cells apart by {mark!r}"
-        raise UnusableInput(f"{path}: row {header} {why}; save the file with commas, semicolons or tabs between cells")
+        raise UnusableInput(
+            f"{path}: row {header} has a single cell; begin lines above the names of the columns with #, or separate "
+            f"the cells with commas, semicolons or tabs"
+        )
     columns: list[list[str]] = [[] for _ in names]
     blank = 0
     for number, row in enumerate(islice(rows, bool(layout.units), None), start=first):
@@ -89,10 +94,10 @@ def parse_decimal_commas(cells: Sequence[str]) -> Float[np.ndarray, " T"]:
 
 
 def _check_cell(index: int, cell: str, example: str = "-1.25") -> None:
-    if not cell.strip():
-        raise BadCell(index, "the cell is empty; fill it in or end the record at the row before")
-    if cell.strip().lower().lstrip("+-") in ("nan", "inf", "infinity", "na", "n/a", "null", "none"):
-        raise BadCell(index, f"{short(cell)} is no measurement; correct it or end the record at the row before")
+    if is_missing(cell):
+        raise BadCell(index, f"{short(cell)} is no measurement" if cell.strip() else "the cell is empty", missing=True)
+    if cell.strip().lower().lstrip("+-") in ("inf", "infinity"):
+        raise BadCell(index, f"{short(cell)} is no measurement; {CORRECT}")
     try:
         float(cell)
         plain = NUMBER_CHARACTERS.issuperset(cell)
@@ -115,7 +120,7 @@ def _text(path: Path, content: bytes) -> str:
         raise UnusableInput(f"{path}: row {row} holds a NUL byte, so this is no text; save the file as CSV")
     if not text.strip():
         raise UnusableInput(f"{path} is empty; give it a line of column names and a line per sample")
-    return text
+    return BLANKS_AFTER_QUOTE.sub(r"\1", text) if '" ' in text else text
 
 
 def _rows(path: Path, text: str, layout: Layout) -> Iterator[list[str]]:
@@ -124,7 +129,7 @@ def _rows(path: Path, text: str, layout: Layout) -> Iterator[list[str]]:
     for _ in range(layout.skipped):
         at = LINE.match(text, at).end()  # type: ignore[union-attr]  # it matches anywhere
     stream = io.StringIO(text[at:].lstrip("# ") if layout.header_is_comment else text[at:], newline="")
-    reader = csv.reader(stream, strict=True, delimiter=layout.separator)
+    reader = csv.reader(stream, strict=True, delimiter=layout.separator, skipinitialspace=True)
     number = layout.skipped
     try:
         for number, row in enumerate(reader, start=layout.skipped + 1):
@@ -135,8 +140,10 @@ def _rows(path: Path, text: str, layout: Layout) -> Iterator[list[str]]:
             yield row
     except csv.Error as error:
         apart = {",": "commas", ";": "semicolons", "\t": "tabs"}[layout.separator]
-        why = f"row {number + 1} is no CSV: {error}; keep each sample on one line, cells apart by {apart}"
-        raise UnusableInput(f"{path}: {why}") from None
+        why = f"is no CSV: {error}; keep each sample on one line, cells apart by {apart}"
+        if "expected after" in str(error):
+            why = "has text after a closing quote; remove it, or double the quotes within a cell"
+        raise UnusableInput(f"{path}: row {number + 1} {why}") from None
 
 
 def _uneven(path: Path, number: int, row: list[str], names: tuple[str, ...], header: int) -> UnusableInput:

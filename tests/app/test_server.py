@@ -102,6 +102,19 @@ def test_headings_suggest_what_columns_are(served):
     assert chosen == ['"input"', '"output"', '"simulated"', '""']
 
 
+def test_a_column_with_missing_cells_can_be_chosen(served):
+    _, page = ask(served, upload(served, {"a.csv": b"t,u,y,note\n0,1,2,\n1,,1,\n2,2,1,\n"}))
+    rows = [row.partition("</tr>")[0] for row in page.split("<tr data-column=")[1:]]
+    assert ["value=" in row for row in rows] == [True, True]  # a column without numbers has no row to choose in
+    assert "after missing cells" in page
+
+
+def test_a_clock_that_gives_no_sampling_time_leaves_a_place_for_one(served):
+    for stamps, asked in (("01234567", False), ("00001111", True)):
+        text = "t,u,y\n" + "".join(f"{t},{k % 2},{k}\n" for k, t in enumerate(stamps))
+        assert ('name="dt"' in ask(served, upload(served, {"a.csv": text.encode()}))[1]) == asked
+
+
 def test_settings_that_are_none_are_refused_in_a_sentence(served):
     page = upload(served, {"a.csv": b"u,y\n1,2\n2,1\n"})
     for body in (b"", b"[]", b'{"dt": "x"}', b'{"outside": 1}', b"\xff"):

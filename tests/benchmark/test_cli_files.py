@@ -88,7 +88,7 @@ def test_uneven_time_is_put_right_by_the_option_that_the_refusal_names(capsys, m
     assert "--split-gaps" in err
     code, out, _ = run(capsys, "fit", "mean", motor, *COLUMNS, "--split-gaps")
     assert code == 0
-    assert "2 experiments of one file, cut at 1 gaps" in out
+    assert "2 experiments of one file, cut at 1 gap in" in out
     code, out, _ = run(capsys, "data", "check", motor, *COLUMNS, "--split-gaps", "--resample", "0.02")
     assert code == 0
     assert "560 rows resampled to 280 samples every 0.02 s, each the mean over 0.02 s" in out

@@ -121,8 +121,9 @@ def test_an_input_that_never_moves_in_training_is_named(refused_cell):
 
 
 @pytest.mark.parametrize("mark", ["|", " "])
-def test_a_file_with_other_marks_between_cells_is_told_so(refused_cell, mark):
-    assert f"apart by {mark!r}" in refused_cell((HEADER + "".join(ROWS)).replace(",", mark), row=1, column=None)
+def test_a_file_with_other_marks_between_cells_is_told_which_to_take(refused_cell, mark):
+    said = refused_cell((HEADER + "".join(ROWS)).replace(",", mark), row=1, column=None)
+    assert "has a single cell; begin lines above the names of the columns with #, or separate the cells with" in said
 
 
 @pytest.mark.parametrize("content", ["", "\n\n", "  \n", "\ufeff"])
@@ -139,7 +140,8 @@ def test_a_file_with_only_a_header_is_refused(refused_cell):
 
 
 def test_a_file_with_too_few_rows_for_three_splits_is_refused(refused_cell):
-    refused_cell(HEADER + "".join(ROWS[:3]), row=None, column=None)
+    said = refused_cell(HEADER + "".join(ROWS[:3]), row=None, column=None)
+    assert "train has 1 row, no more than the 1 (n_init) that start a simulation; record more samples" in said
 
 
 def test_wrong_encoding_is_named_by_its_row(refused_cell):
@@ -165,6 +167,19 @@ def test_a_cell_over_two_lines_is_named_by_its_row(refused_cell):
 
 def test_an_open_quote_is_named_by_its_row(refused_cell):
     refused_cell(with_row(5, '0.3,1,"2\n'), row=5, column=None)
+
+
+def test_text_after_a_closing_quote_is_named_by_its_row(refused_cell):
+    assert "text after a closing quote" in refused_cell(with_row(5, '0.3,"1"2,1\n'), row=5, column=None)
+
+
+def test_blanks_around_quoted_cells_are_fine(tmp_path):
+    file = tmp_path / "log.csv"
+    file.write_text(HEADER + "".join(ROWS))
+    plain = load(file, ["u"], ["phi"])
+    cells = [", ".join(f'"{cell}" ' for cell in row.strip().split(",")) for row in (HEADER, *ROWS)]
+    file.write_text("\n".join(cells))
+    assert load(file, ["u"], ["phi"]).sha256 == plain.sha256
 
 
 def test_a_cell_beyond_the_limit_of_the_csv_module_is_named_by_its_row(refused_cell):

@@ -17,7 +17,7 @@ def names(experiments):
     return [experiment.name for experiment in experiments]
 
 
-def test_whole_logs_are_parted_60_20_20_in_the_order_of_their_numbers(logs):
+def test_whole_logs_are_split_60_20_20_in_the_order_of_their_numbers(logs):
     data = load(logs, **COLUMNS)
     assert data.name == "logs"
     assert names(data.training.train) == [f"log{k}" for k in range(1, 7)]
@@ -35,7 +35,7 @@ def test_one_log_in_a_folder_is_the_record_of_that_file(logs):
 
 
 def test_what_was_inferred_says_how_many_logs_there_are(logs):
-    assert "10 logs, parted 60/20/20 in this order: log1, log2, log3, .." in read(logs, **COLUMNS).said
+    assert "10 logs, split 60/20/20 in this order: log1, log2, log3, .." in read(logs, **COLUMNS).said
 
 
 def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsys):
@@ -45,7 +45,7 @@ def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsy
         "log5", "log2", "log7", "log1", "log9"
     ]  # fmt: skip
     assert main(["fit", "arx", *files, "--input", "u", "--output", "phi"]) == 0
-    assert "5 logs, parted 60/20/20 in this order: log5, log2, log7, .." in capsys.readouterr().out
+    assert "5 logs, split 60/20/20 in this order: log5, log2, log7, .." in capsys.readouterr().out
     (logs / "old").mkdir()
     shutil.copy(files[0], logs / "old" / "log5.csv")
     assert names(load([*files, str(logs / "old" / "log5.csv")], **COLUMNS).training.train)[:2] == ["1_log5", "2_log2"]

@@ -4,6 +4,7 @@ import tomllib
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import simgap
@@ -96,6 +97,14 @@ def test_a_bad_table_gets_one_sentence(channels, table, says):
     with pytest.raises(UnusableInput, match=r"^d: \[plant\]") as raised:
         read_plant(table, channels, "d")
     assert says in str(raised.value)
+
+
+def test_an_option_that_needs_a_kind_names_the_option_that_says_it(refused):
+    log = pd.DataFrame({"t": np.arange(50) * 0.1, "u": np.sin(np.arange(50)), "my y": np.arange(50.0)})
+    said = refused(log, ["u"], ["my y"], known={"mass": "1 kg"})
+    assert 'add --kind "my y=velocity", or position or level (kind=.. in Python), or leave --known out' in said
+    assert "[plant]" not in said
+    assert "there are 'u', 'my y'; name one of them" in refused(log, ["t"], ["u", "my y"], dt=0.1, known={"mass": 1.0})
 
 
 def test_options_are_written_like_mass_0_5_kg():

@@ -53,7 +53,7 @@ def test_a_gap_starts_a_new_experiment():
     assert reading.dataset.training.dt == 0.1
     for part in parts:
         np.testing.assert_allclose(np.diff(part.y[:, 0]), 0.3)
-    assert reading.said == ("sampling time 0.1 s from column t", "2 experiments of one file, cut at 1 gaps in column t")
+    assert reading.said == ("sampling time 0.1 s from column t", "2 experiments of one file, cut at 1 gap in column t")
 
 
 def test_time_that_starts_again_starts_a_new_experiment():
@@ -135,7 +135,7 @@ def test_nothing_is_interpolated_across_a_wide_gap(refused):
     assert "row 300" in sentence
     assert "--split-gaps" in sentence
     reading = read(frame(t), ["u"], ["y"], resample=0.1, split_gaps=True)
-    assert "cut at 1 gaps" in str(reading)
+    assert "cut at 1 gap in" in str(reading)
     assert "resampled" in str(reading)
     for part in experiments(reading.dataset):
         np.testing.assert_allclose(np.diff(part.y[:, 0]), 0.3)

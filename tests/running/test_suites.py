@@ -162,6 +162,11 @@ def test_a_wrong_suite_is_refused_in_one_sentence(tmp_path, text, complaint):
 
 
 def test_an_unknown_suite_is_refused_with_the_known_ones():
-    known = "benchmark, crossover, full, paper, records, smoke, tuned"
+    known = "benchmark, crossover, full, paper, records, smoke, tuned, recovery"
     with pytest.raises(UnusableInput, match=f"no suite 'nosuch'; known are {known}"):
         load_suite("nosuch")
+
+
+def test_the_recovery_study_is_no_suite_and_says_how_it_is_run():
+    with pytest.raises(UnusableInput, match="is a study and no suite of models; `simgap run recovery` runs it"):
+        load_suite("recovery")
