@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.fitting import Estimate, best_descent
 from simgap.greybox.held_out import block_errors, squares_of_blocks
 from simgap.greybox.noise import Noise, white_as_large_as
 from simgap.greybox.outliers import Outliers
@@ -101,8 +101,4 @@ class Baseline:
         self, terms: Sequence[Term], starts: Iterable[tuple[np.ndarray, np.ndarray | None]], max_steps: int = MAX_STEPS
     ) -> Estimate:
         """Fit a set of terms from several starts and return the best."""
-        problem = self.problem(self.plant.having(terms))
-        return min(
-            (descend(problem, *start, max_steps=max_steps, tolerance=TOLERANCE) for start in starts),
-            key=lambda fit: fit.squares,
-        )
+        return best_descent(self.problem(self.plant.having(terms)), starts, max_steps, TOLERANCE)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
+from simgap.cores import on_cores
 from simgap.greybox.levenberg import minimise
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
@@ -54,6 +57,23 @@ def descend(
     converged = minimise(descent, max_steps, tolerance)
     squares = problem.squares(descent.errors)
     return Estimate(plant, descent.theta, descent.local, descent.errors, squares, bool(converged.all()))
+
+
+def best_descent(
+    problem: Problem,
+    starts: Iterable[tuple[np.ndarray, np.ndarray | None]],
+    max_steps: int = MAX_STEPS,
+    tolerance: float = TOLERANCE,
+) -> Estimate:
+    """Fit from each of several starts, side by side, and return the best."""
+    fits = on_cores(partial(_from_start, problem, max_steps, tolerance), list(starts))
+    return min(fits, key=lambda fit: fit.squares)
+
+
+def _from_start(
+    problem: Problem, max_steps: int, tolerance: float, start: tuple[np.ndarray, np.ndarray | None]
+) -> Estimate:
+    return descend(problem, *start, max_steps=max_steps, tolerance=tolerance)
 
 
 class _Together:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
-from simgap.greybox.fitting import Estimate, descend
+from simgap.greybox.fitting import Estimate, best_descent, descend
 from simgap.greybox.held_out import errors_on
 from simgap.greybox.machine import DAMPING, INERTIA, NAMES, STIFFNESS, Machine, machine_of
 from simgap.greybox.noise import white, white_as_large_as
@@ -88,8 +88,7 @@ def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -
         fixed = np.ones(plant.size, dtype=bool) if machine.controlled else ~gain
         tried.append(descend(problem, theta, fixed=fixed, max_steps=2))
     tried.sort(key=lambda fit: fit.squares)
-    best = min((descend(problem, fit.theta, fit.local) for fit in tried[:FINALISTS]), key=lambda fit: fit.squares)
-    return _weighed(best, records)
+    return _weighed(best_descent(problem, [(fit.theta, fit.local) for fit in tried[:FINALISTS]]), records)
 
 
 def _weighed(fit: Estimate, records: Records) -> Estimate:

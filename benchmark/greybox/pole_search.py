@@ -9,7 +9,7 @@ from itertools import combinations, combinations_with_replacement
 import numpy as np
 
 from simgap.cores import on_cores
-from simgap.greybox.fitting import MAX_STEPS, TOLERANCE, Estimate, descend
+from simgap.greybox.fitting import MAX_STEPS, Estimate, best_descent, descend
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
@@ -75,8 +75,7 @@ def _finished(problem: Problem, tried: list[Estimate], max_steps: int) -> Estima
     """Fit the best of these on; then again, the outputs weighed by how well they can be simulated."""
     plant, records = problem.plant, problem.records
     tried.sort(key=lambda fit: fit.squares)
-    fits = on_cores(partial(_go_on, problem, max_steps=max_steps), tried[:FINALISTS])
-    best = min(fits, key=lambda fit: fit.squares)
+    best = best_descent(problem, [(fit.theta, fit.local) for fit in tried[:FINALISTS]], max_steps)
     noise = white_as_large_as(best.errors, records.mask, records.resolution)
     return descend(Problem(plant, records, noise), best.theta, best.local)
 
@@ -119,13 +118,8 @@ def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int,
             begun.append(theta)
     tried = on_cores(partial(descend, problem, fixed=~gains, max_steps=2, tolerance=1.0), begun)
     tried.sort(key=lambda fit: fit.squares)
-    fits = on_cores(partial(_go_on, problem, max_steps=max_steps, tolerance=tolerance), tried[:FINALISTS])
-    best = min(fits, key=lambda fit: fit.squares)
+    best = best_descent(problem, [(fit.theta, fit.local) for fit in tried[:FINALISTS]], max_steps, tolerance)
     return descend(problem, best.theta, best.local) if plant.sign_hidden else best
-
-
-def _go_on(problem: Problem, fit: Estimate, max_steps: int, tolerance: float = TOLERANCE) -> Estimate:
-    return descend(problem, fit.theta, fit.local, max_steps=max_steps, tolerance=tolerance)
 
 
 def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:
