@@ -35,7 +35,10 @@ def headline(findings: Findings) -> str:
     else:
         change = "cannot be compared, because a simulation diverges"
     if findings.verdict == "suspected":
-        return f"Suspected, not shown: {listed}. The training data ask for {them}, but {_not_shown(findings)} {change}."
+        asked = f"Nothing is named. The training data ask for {listed}"
+        if gain.share > 0:
+            asked = f"Suspected, not shown: {listed}. The training data ask for {them}"
+        return f"{asked}, but {_not_shown(findings)} {change}."
     whose, corrected = ("Your", "corrected,") if findings.simulation else ("The", f"with {them}")
     wrong_numbers = findings.simulation is not None and findings.simulation.linear_differs
     listed += ", and of wrong parameters of its linear part" * wrong_numbers

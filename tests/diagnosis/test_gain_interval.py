@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from simgap.diagnosis.gains import measure
 from simgap.error_views.correlation import correlation_time
-from simgap.error_views.gain_interval import block_starts, share_with_interval
+from simgap.error_views.gain_interval import block_starts, share_of_few, share_with_interval
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 STUDY = runpy.run_path(str(Path(__file__).with_name("interval_study.py")))
@@ -62,14 +62,40 @@ def test_the_memory_of_errors_widens_the_interval():
 
 
 @pytest.mark.parametrize(("slow", "shown"), [(0.0, True), (0.1, False)])
-def test_a_gain_in_every_block_is_shown_whatever_their_sizes_but_a_slow_error_is_seen_once(slow, shown):
+def test_a_large_gain_is_shown_whatever_the_sizes_of_errors_but_a_slow_error_is_seen_once(slow, shown):
     rng = np.random.default_rng(6)
     size = np.exp(np.linspace(-3, 0, 800))  # so that the memory of its square is as long as the record
     before = slow + size * STUDY["errors"](rng, 1, 800, 20)[0]
     after = 0.1 * slow + 0.002 * rng.standard_normal(800)
     memory = max(correlation_time(e, [800], 0)[0] for e in (before, after))
-    assert share_with_interval(before**2, after**2, np.array([800]))[1] <= 0
     assert (share_with_interval(before**2, after**2, np.array([800]), memory)[1] > 0.5) == shown
+
+
+def test_a_record_of_a_few_memories_shows_a_large_gain():
+    # Errors of one memory and more of another machine: Gaussian, slow, one of them twenty times as small.
+    rng = np.random.default_rng(12)
+    shown = []
+    for _ in range(100):
+        before, after = (STUDY["errors"](rng, 1, 200, 50)[0] for _ in range(2))
+        memory = max(correlation_time(e, [200], 0)[0] for e in (before, after))
+        shown.append(share_of_few(before**2, (0.05 * after) ** 2, np.array([200]), memory) > 0)
+    assert np.mean(shown) > 0.6
+
+
+@pytest.mark.parametrize("experiments", [1, 4])
+@pytest.mark.parametrize("memory", [1, 10, 150])
+@pytest.mark.parametrize("sizes", ["even", "half", "bursts"])
+def test_no_size_of_errors_and_no_memory_makes_chance_pass_for_a_gain(sizes, memory, experiments):
+    rng, above = np.random.default_rng(13), []
+    for _ in range(300):
+        size = np.full((2, experiments, 100), 0.1)
+        for k, experiment in np.ndindex(2, experiments):
+            at = {"even": 0, "half": 50, "bursts": rng.integers(95)}[sizes]
+            size[k, experiment, at : at + 5 if sizes == "bursts" else None] = 1.0
+        both = [(s * STUDY["errors"](rng, experiments, 100, memory)).ravel() for s in size]
+        known = max(correlation_time(e, np.full(experiments, 100), 0)[0] for e in both)
+        above.append(share_of_few(*(e**2 for e in both), np.full(experiments, 100), known) > 0)
+    assert np.mean(above) < 0.045  # 2.5 % and what chance adds to it in 300 draws
 
 
 def test_of_few_experiments_no_block_is_shorter_than_asked_but_where_two_are_wanted():

@@ -48,7 +48,6 @@ THRESHOLDS = (
     ("simgap.greybox.kind_of_output", "ALIKE"),
     ("simgap.greybox.outliers", "APART"),
     ("simgap.diagnosis.promises", "MOST"),
-    ("simgap.error_views.gain_interval", "LARGE"),
     ("simgap.diagnosis.doubts", "TOGETHER"),
     ("simgap.diagnosis.doubts", "CERTAIN"),
     ("simgap.diagnosis.diagnose", "LEFT_OF_EXPLAINED"),

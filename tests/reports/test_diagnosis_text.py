@@ -123,8 +123,8 @@ def test_test_experiments_that_speak_against_suspects_are_said_to(suspected):
     worse = replace(suspected.gain, share=-0.04, low=-0.07, high=-0.01)
     both = (suspected.suspects[0], replace(suspected.suspects[0], title="backlash"))
     assert (
-        "Coulomb friction and backlash. The training data ask for them, but the test experiments speak against them: "
-        "with them the free-run error rises by 4 % (1 to 7 %)."
+        "Nothing is named. The training data ask for Coulomb friction and backlash, but the test experiments speak "
+        "against them: with them the free-run error rises by 4 % (1 to 7 %)."
     ) in in_one_line(diagnosis_text(replace(suspected, gain=worse, suspects=both)))
 
 
