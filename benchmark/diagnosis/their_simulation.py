@@ -118,7 +118,7 @@ def _added(side: SideBySide, term: Term, dataset: Dataset) -> Cause:
     """Describe an effect that the simulation has and the machine was not found to have."""
     plant, effect = side.machine.estimate.plant, term.effect
     rows = zip(plant.parameters_of(term), *side.numbers(plant.part_of(term)), strict=True)
-    values = tuple(Value(p.name, p.unit, float(v), float(a), float(b)) for p, v, a, b in rows if not p.is_absent)
+    values = tuple(Value(p.name, p.unit, float(v), float(a), float(b)) for p, v, a, b in rows if p.told)
     text = effect.describe({value.name: value.value for value in values})
     return Cause(
         effect.name, effect.title, text, effect.reference, _channel(term, side, dataset),
@@ -132,7 +132,7 @@ def _values(side: SideBySide, term: Term) -> dict[str, float]:
         return {}
     plant = side.simulation.plant
     named = zip(plant.parameters_of(term), side.simulation.theta[plant.part_of(term)], strict=True)
-    return {parameter.name: float(value) for parameter, value in named if not parameter.is_absent}
+    return {parameter.name: float(value) for parameter, value in named if parameter.told}
 
 
 def _about(dataset: Dataset, simulated: Dataset, sides: Sequence[SideBySide]) -> TheirSimulation:

@@ -171,7 +171,7 @@ class Evidence:
             return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
         part = plant.part_of(term)
         rows = zip(parameters, estimate.theta[part], low[part], high[part], strict=True)
-        shown = [row for row in rows if not row[0].is_absent]
+        shown = [row for row in rows if row[0].told]
         return tuple(Value(p.name, p.unit, float(value), float(a), float(b)) for p, value, a, b in shown)
 
     def _rivals(self, term: Term, without: Trial) -> list[Rival]:

@@ -51,7 +51,7 @@ def descend(
     local = problem.at_rest(theta) if local is None else local.copy()
     if plant.sign_hidden:
         local = problem.other_side(theta, local)
-    if plant.remembered and not plant.imposed:
+    if any(not term.effect.linear for term in plant.remembered) and not plant.imposed:
         local = problem.better_start(theta, local)
     descent = _Together(problem, theta, local, free) if free.any() else _OneByOne(problem, theta, local)
     converged = minimise(descent, max_steps, tolerance)

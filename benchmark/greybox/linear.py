@@ -71,24 +71,30 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
     baseline = baseline_of(models[-1])
-    to_beat = baseline.held_out_errors(baseline.estimate)
     for simpler in (fit for fit in models[:-1] if fit.plant.by_rate or not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
-        if any(_does_as_well(add(other, other.estimate, term), baseline, to_beat) for term in instead):
+        if any(_takes_its_place(add(other, other.estimate, term), baseline) for term in instead):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
 
 
-def _does_as_well(other: Estimate, baseline: Baseline, to_beat: np.ndarray) -> bool:
-    """Tell whether a model does not err more than the plain one in most held-out blocks, and scores higher."""
-    held_out = baseline.held_out_errors(other)
-    if in_most(held_out - to_beat):  # as nearly all do, at less cost
+def _takes_its_place(other: Estimate, baseline: Baseline) -> bool:
+    """Tell whether a model does as well as the plain one, and no order of as few parameters as well as that model."""
+    if not _does_as_well(baseline, other, baseline.estimate):
         return False
-    return score_gain(baseline, other, baseline, baseline.estimate) > 0
+    as_few = [fit for fit in baseline.orders if fit.plant.free.sum() <= other.plant.free.sum()]
+    return not any(_does_as_well(baseline, fit, other) for fit in as_few)
+
+
+def _does_as_well(baseline: Baseline, one: Estimate, other: Estimate) -> bool:
+    """Tell whether a model does not err more than another in most held-out blocks, and scores higher."""
+    if in_most(baseline.held_out_errors(one) - baseline.held_out_errors(other)):  # as nearly all do, at less cost
+        return False
+    return score_gain(baseline, one, baseline, other) > 0
 
 
 def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:

@@ -178,13 +178,21 @@ class Plant:
 
     @cached_property
     def remembered(self) -> tuple[Term, ...]:
-        """The terms in an unknown state at the start, those of the input first; a known machine begins at rest."""
+        """The terms in an unknown state at the start, in the order in which signals pass them.
+
+        A known machine begins at rest.
+        """
         found = [term for term in self.terms if term.effect.memory and term.effect.role != "friction"]
         inputs = [term for term in found if term.effect.port == "input"]
         if self.machine is not None:
-            return tuple(inputs)
+            return tuple(term for term in inputs if not term.effect.linear)
         forces = [term for term in found if term.effect.port == "force"]
-        return (*inputs, *(term for term in forces if self.imposed or term.effect.begins_anywhere))
+        sensors = [term for term in found if term.effect.port == "output"]
+        return (*inputs, *(term for term in forces if self.imposed or term.effect.begins_anywhere), *sensors)
+
+    def start_of(self, term: Term) -> int:
+        """Return where the number that a term remembers stands in the initial state."""
+        return self.order + self.remembered.index(term)
 
     @cached_property
     def n_moving(self) -> int:
@@ -203,8 +211,13 @@ class Plant:
 
     @property
     def n_of_terms(self) -> int:
-        """Numbers of an experiment that its terms ask for: their own, and where what they remember begins."""
-        return self.n_own + len(self.remembered)
+        """Numbers of an experiment that its terms are charged for: their own, and where what they remember begins."""
+        return self.n_own + len(self.remembered) - self.n_states
+
+    @property
+    def n_states(self) -> int:
+        """Numbers of an experiment that linear terms remember: more states, and no order is charged for its states."""
+        return sum(term.effect.linear for term in self.remembered)
 
     def own_part_of(self, term: Term) -> slice:
         """Return where the numbers of a per-experiment term stand among those of an experiment."""
@@ -270,9 +283,9 @@ class Plant:
         numbers = np.zeros((len(local), self.n_local))
         if self.order == smaller.order:
             numbers[:, : self.order] = local[:, : self.order]
-        for i, term in enumerate(self.remembered, start=self.order):
+        for term in self.remembered:
             if term in smaller.remembered:
-                numbers[:, i] = local[:, smaller.order + smaller.remembered.index(term)]
+                numbers[:, self.start_of(term)] = local[:, smaller.start_of(term)]
         for term in (one for one in self.terms if one in smaller.terms):
             if term in self.per_experiment:
                 numbers[:, self.own_part_of(term)] = local[:, smaller.own_part_of(term)]

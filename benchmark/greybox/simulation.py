@@ -17,6 +17,7 @@ from simgap.greybox.linear_kernels import read, run_linear, transitions
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine
 from simgap.greybox.plant import Plant
+from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
 
 ROLES = get_args(Role)  # as the kernels number them
@@ -115,7 +116,9 @@ class Simulator:
         memory = np.cumsum([0] + [term.effect.memory for term in forces])
         self._m_at = np.array([*memory, *([memory[-1]] * unused)])  # one more: where the last one's memory ends
         self._memory = np.zeros(max(1, int(memory[-1])))
-        self._remembered = [at for term, at in zip(forces, memory, strict=False) if term in plant.remembered]
+        remembered = [(term, at) for term, at in zip(forces, memory, strict=False) if term in plant.remembered]
+        self._remembered = [at for _, at in remembered]
+        self._begins_at = [plant.start_of(term) for term, _ in remembered]
 
     def states(
         self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E n"]
@@ -150,8 +153,8 @@ class Simulator:
 
     def _begun(self, starts: Float[np.ndarray, "*S E n"]) -> Float[np.ndarray, "*S E m"]:
         """Take what the force terms remember at the start out of the initial states."""
-        begun, n = np.zeros((*starts.shape[:-1], len(self._memory))), self.plant.n_start
-        begun[..., self._remembered] = np.clip(starts[..., n - len(self._remembered) : n], -1.0, 1.0)
+        begun = np.zeros((*starts.shape[:-1], len(self._memory)))
+        begun[..., self._remembered] = np.clip(starts[..., self._begins_at], -1.0, 1.0)
         return begun
 
     def _of_machine(self) -> tuple[np.ndarray, ...]:
@@ -239,5 +242,12 @@ class Simulator:
                 if term.effect.own:
                     y[:, :, channel] += local[:, plant.own_part_of(term)] @ term.effect.shapes(self.t, self._duration)
                 else:
-                    assert isinstance(term.effect, OutputEffect)
-                    y[:, :, channel] = term.effect.term(y[:, :, channel], theta[plant.part_of(term)], self.t)
+                    y[:, :, channel] = self._read(term, y[:, :, channel], theta[plant.part_of(term)], local)
+
+    def _read(
+        self, term: Term, y: Float[np.ndarray, "E T"], p: Float[np.ndarray, " k"], local: Float[np.ndarray, "E q"]
+    ) -> Float[np.ndarray, "E T"]:
+        assert isinstance(term.effect, OutputEffect)
+        if term in self.plant.remembered:
+            return term.effect.term_from(y, p, self.t, local[:, self.plant.start_of(term)])
+        return term.effect.term(y, p, self.t)

@@ -142,12 +142,12 @@ def in_order(search, trial):
 
 def trial(
     search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out=None, held_out_gain=0.0, own_there=0,
-    effects=(), memory=0.0, but_lines=None,
+    effects=(), memory=0.0, but_lines=None, states=0,
 ):  # fmt: skip
     """A trial of hand-made numbers.
 
     `squares` of the plain model's; `own` and `own_there` count numbers of single experiments in training and held-out
-    data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
+    data, `states` those of linear terms; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
     the share of the errors that the errors before them explain, `but_lines` the squares of held-out blocks where a
     straight line in each record counts for nothing.
     """
@@ -155,7 +155,7 @@ def trial(
     blocks, detrended = (np.ones(20) if it is None else np.asarray(it, dtype=float) for it in (held_out, but_lines))
     likelihoods = float(log_likelihood), float(held_out_gain)
     terms = tuple(term(name) for name in effects)
-    numbers = parameters, int(own_there > 0), own, own_there
+    numbers = parameters, int(own_there > 0), own, own_there, states
     return Trial(terms, estimate, search.train, *likelihoods, *numbers, memory, blocks, detrended)
 
 

@@ -96,23 +96,22 @@ class SignalScales:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect, with its unit and its bounds. A fixed one is read off the data and not estimated."""
+    """One number of an effect, with its unit and its bounds. A fixed one is read off the data and not estimated.
+
+    One that is not `told` is shown in no answer.
+    """
 
     name: str
     unit: str
     low: float
     high: float
     fixed: bool = False
+    told: bool = True
 
     @classmethod
     def absent(cls, name: str) -> Parameter:
-        """Return a parameter that an effect has on other plants only; it is zero, and no answer shows it."""
-        return cls(name, "", 0.0, 0.0, fixed=True)
-
-    @property
-    def is_absent(self) -> bool:
-        """Whether the effect does without it on this plant."""
-        return self.fixed and self.low == self.high == 0.0
+        """Return a parameter that an effect has on other plants only; it is zero."""
+        return cls(name, "", 0.0, 0.0, fixed=True, told=False)
 
 
 class Start(NamedTuple):
@@ -120,6 +119,12 @@ class Start(NamedTuple):
 
     values: tuple[float, ...]
     amplitude: int | None = None
+
+
+def range_of_input(scales: SignalScales) -> Parameter:
+    """Return the range in which an input stood before a record begins."""
+    reach = scales.u_high - scales.u_low
+    return Parameter("range of the input", scales.u_unit, reach, reach, fixed=True, told=False)
 
 
 class Effect(ABC):
@@ -278,7 +283,12 @@ class OutputEffect(Effect):
     @staticmethod
     @abstractmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return the reading of y [E, T] at the times t [T] in s."""
+        """Return the reading of y [E, T] at the times t [T] in s; the record starts at rest."""
+
+    @staticmethod
+    def term_from(y: np.ndarray, p: np.ndarray, t: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Return the same for records that start with this in memory; for terms that have any."""
+        raise NotImplementedError
 
     # The same for one number after the other, as that of an InputEffect; not for what belongs to one experiment.
     step: ClassVar[Callable[..., float]]

@@ -107,6 +107,8 @@ class FilteredSaturation(InputEffect):
     @staticmethod
     def step(u, p, i, m, j, h, k):
         """Return the same, substep by substep; it keeps the lag, and x and x' of the filter behind it."""
+        if k == 0:
+            m[j] = u
         w = lagged_step(u, p[i], m, j, h, k)
         t = p[i + 3]
         if k == 0:

@@ -66,6 +66,8 @@ class InnerSaturation(InputEffect):
     @staticmethod
     def step(u, p, i, m, j, h, k):
         """Return the same, substep by substep."""
+        if k == 0:
+            m[j] = u
         return min(max(lagged_step(u, p[i], m, j, h, k), p[i + 1]), max(p[i + 1], p[i + 2]))
 
     @staticmethod

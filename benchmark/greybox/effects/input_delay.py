@@ -7,7 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start, range_of_input
 from simgap.registry import EFFECTS
 
 
@@ -25,6 +25,7 @@ class InputDelay(InputEffect):
     reference: ClassVar[str] = "Ljung, System Identification, 1999, sec. 4.2 and 10.3"
     on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 10
+    memory: ClassVar[int] = 1
     linear: ClassVar[bool] = True
     instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("time since reversal", "frequency band")
@@ -37,19 +38,29 @@ class InputDelay(InputEffect):
     substeps: ClassVar[int] = 4
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the delay."""
-        return (Parameter("delay", "s", 0.0, min(60 * scales.dt, 0.25 * scales.duration)),)
+        """Return the delay, and the range of the input that it may have had before a record."""
+        return (
+            Parameter("delay", "s", 0.0, min(60 * scales.dt, 0.25 * scales.duration)),
+            range_of_input(scales),
+        )
 
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from half a sample to many."""
-        return [Start((n * scales.dt,)) for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
+        usual = [n * scales.dt for n in (0.5, 1.5, 3.0, 6.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
+        return [Start((delay, range_of_input(scales).low)) for delay in usual]
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return the mean over each step of u, p[0] seconds before; before the record u stood at its first value."""
+        return InputDelay.term_from(u, p, h, np.zeros(len(u)))
+
+    @staticmethod
+    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
+        """Return the same where u stood by `start` of its range beside its first value."""
         whole, part = divmod(max(p[0], 0.0) / h, 1.0)
         steps = min(int(whole), u.shape[1] - 1)
-        padded = np.concatenate((np.repeat(u[:, :1], steps + 1, axis=1), u), axis=1)
+        past = u[:, 0] + p[1] * start
+        padded = np.concatenate((np.repeat(past[:, None], steps + 1, axis=1), u), axis=1)
         return (1 - part) * padded[:, 1 : 1 + u.shape[1]] + part * padded[:, : u.shape[1]]
 
     @staticmethod
@@ -59,8 +70,9 @@ class InputDelay(InputEffect):
         steps = int(late)
         size = steps + 2  # of the ring of past values
         if k == 0:
+            past = u + p[i + 1] * m[j]
             for at in range(size):
-                m[j + at] = u
+                m[j + at] = past
         m[j + k % size] = u
         part = late - steps
         return (1 - part) * m[j + (k + 2) % size] + part * m[j + (k + 1) % size]
