@@ -157,7 +157,8 @@ def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | Non
     fine = replace(term, effect=law())
     plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-    theta[plant.part_of(fine)] = numbers
+    part = plant.part_of(fine)
+    theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
     return baseline.fit(plant.terms, [(theta, local)])
 
 

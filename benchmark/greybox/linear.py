@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from simgap.greybox.additions import add
+from simgap.greybox.additions import add, refine
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
 from simgap.greybox.fitting import Estimate, descend
@@ -75,11 +75,19 @@ def find_baseline(
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
-        if any(_takes_its_place(add(other, other.estimate, term), baseline) for term in instead):
+        if any(_takes_its_place(fit, baseline) for term in instead for fit in _laws(other, term)):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
+
+
+def _laws(simpler: Baseline, term: Term) -> Iterator[Estimate]:
+    """Fit an effect to a simpler plant, then the form of its law that has more numbers."""
+    fit = add(simpler, simpler.estimate, term)
+    yield fit
+    if (fine := refine(simpler, fit, term)) is not None:
+        yield fine
 
 
 def _takes_its_place(other: Estimate, baseline: Baseline) -> bool:

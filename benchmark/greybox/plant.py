@@ -211,13 +211,8 @@ class Plant:
 
     @property
     def n_of_terms(self) -> int:
-        """Numbers of an experiment that its terms are charged for: their own, and where what they remember begins."""
-        return self.n_own + len(self.remembered) - self.n_states
-
-    @property
-    def n_states(self) -> int:
-        """Numbers of an experiment that linear terms remember: more states, and no order is charged for its states."""
-        return sum(term.effect.linear for term in self.remembered)
+        """Numbers of an experiment that its terms ask for: their own, and where what they remember begins."""
+        return self.n_own + len(self.remembered)
 
     def own_part_of(self, term: Term) -> slice:
         """Return where the numbers of a per-experiment term stand among those of an experiment."""

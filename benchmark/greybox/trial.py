@@ -56,7 +56,6 @@ class Trial:
     own: int  # numbers of every experiment that belong to terms of its own
     k_train: int  # parameters of single training experiments: those, and where what terms remember begins
     k_valid: int
-    states: int  # of linear terms at the start of training experiments, which no model is charged for
     memory: float  # share of the squared training errors that the errors before them explain
     blocks: np.ndarray  # held-out squares over the variance of the plain model, block by block
     detrended: np.ndarray  # the same, where a straight line in each record counts for nothing
@@ -88,7 +87,6 @@ def assess(baseline: Baseline, estimate: Estimate, noise_order: int) -> Trial:
         log_likelihood(estimate.errors, baseline.train.mask, noise_order, baseline.resolution),
         log_likelihood(on_valid.errors, valid.mask, noise_order, baseline.resolution),
         int(plant.free.sum()), plant.n_own, len(baseline.train.u) * plant.n_of_terms, len(valid.u) * plant.n_of_terms,
-        len(baseline.train.u) * plant.n_states,
         explained_by_past(estimate.errors, baseline.train.mask),
         squares_of_blocks(problem, on_valid.errors),
         squares_of_blocks(problem, detrended(on_valid.errors, valid.mask)),
@@ -130,7 +128,7 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     next sample as hard to forecast as it was.
     """
     ratio = max(larger.train - smaller.train, free_run_ratio(baseline, smaller, larger))
-    extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train + larger.states - smaller.states)
+    extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
     tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
     return bool(chance < FALSE_NAMES and _matters(baseline, smaller, larger) and holds_out(baseline, smaller, larger))

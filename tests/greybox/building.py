@@ -12,7 +12,7 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
-from simgap.greybox.additions import add, with_any_more
+from simgap.greybox.additions import add, refine, with_any_more
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import detrended as _detrended
@@ -80,6 +80,11 @@ def with_effects(search, *names):
     return assess(search, found, 0)
 
 
+def refined(search, name):
+    """The fit with this effect, of the form that has more numbers."""
+    return refine(search, add(search, search.estimate, term(name)), term(name))
+
+
 def best_of_round(search):
     """The plain model and the best of all its extensions by one effect."""
     fits = with_any_more(search, search.estimate, {})
@@ -142,12 +147,12 @@ def in_order(search, trial):
 
 def trial(
     search, squares=1.0, log_likelihood=0.0, parameters=1, own=0, held_out=None, held_out_gain=0.0, own_there=0,
-    effects=(), memory=0.0, but_lines=None, states=0,
+    effects=(), memory=0.0, but_lines=None,
 ):  # fmt: skip
     """A trial of hand-made numbers.
 
     `squares` of the plain model's; `own` and `own_there` count numbers of single experiments in training and held-out
-    data, `states` those of linear terms; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
+    data; `held_out` are the squares of held-out blocks, `held_out_gain` the log-likelihood of held-out data, `memory`
     the share of the errors that the errors before them explain, `but_lines` the squares of held-out blocks where a
     straight line in each record counts for nothing.
     """
@@ -155,7 +160,7 @@ def trial(
     blocks, detrended = (np.ones(20) if it is None else np.asarray(it, dtype=float) for it in (held_out, but_lines))
     likelihoods = float(log_likelihood), float(held_out_gain)
     terms = tuple(term(name) for name in effects)
-    numbers = parameters, int(own_there > 0), own, own_there, states
+    numbers = parameters, int(own_there > 0), own, own_there
     return Trial(terms, estimate, search.train, *likelihoods, *numbers, memory, blocks, detrended)
 
 

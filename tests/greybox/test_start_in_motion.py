@@ -1,4 +1,4 @@
-"""Records that begin while the input is still on its way: what stood before them is found, and no cause is made of it."""
+"""Records that begin while the input is still on its way: what stood before them is found."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from simgap.registry import EFFECTS
 
-from .building import order_of, plain_search, with_effects
+from .building import order_of, plain_search, refined
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -37,7 +37,7 @@ def begun_in_motion(effect, noise=0.0):
 def test_a_linear_effect_is_fitted_to_its_last_sample_where_it_does_not_begin_settled(effect):
     made = begun_in_motion(effect)
     search = plain_search(made[:3], made[3:], "velocity")
-    fit = with_effects(search, effect).estimate
+    fit = refined(search, effect)
     value = fit.theta[fit.plant.part_of(fit.plant.terms[0])][0]
     size = np.std(search.train.y)
     if effect == "input_delay":
@@ -55,11 +55,11 @@ def test_what_stood_before_a_record_does_not_buy_a_higher_order_than_a_delay():
 
 @pytest.mark.parametrize("effect", LINEAR)
 def test_nothing_in_memory_means_settled(effect):
-    law = EFFECTS[effect]()
+    settled_law, law = EFFECTS[effect](), EFFECTS[effect].refined()
     rng = np.random.default_rng(0)
     values, p, t = rng.standard_normal((3, 50)), np.array([0.37, 5.0]), DT * np.arange(50)
     last = t if law.port == "output" else DT
-    settled, begun = law.term(values, p, last), law.term_from(values, p, last, np.zeros(3))
+    settled, begun = settled_law.term(values, p[:1], last), law.term_from(values, p, last, np.zeros(3))
     np.testing.assert_array_equal(settled, begun)
     away = law.term_from(values, p, last, np.array([0.0, 0.5, -1.0]))
     assert np.max(np.abs(away - settled), axis=1) == pytest.approx([0.0, 2.5, 5.0], rel=0.25, abs=0.0)

@@ -10,28 +10,26 @@ import numpy as np
 from scipy.signal import lfilter
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start, range_of_input
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start, range_of_input
 from simgap.registry import EFFECTS
 
 
-def lagged(u: np.ndarray, time_constant: float, h: float, start: np.ndarray | None = None) -> np.ndarray:
-    """Return the mean over each step of h seconds of u [E, K] behind a first-order lag.
-
-    It begins at `start` [E], or settled.
-    """
+def lagged(u: np.ndarray, time_constant: float, h: float, past: np.ndarray) -> np.ndarray:
+    """Return the mean over each step of h seconds of u [E, K] behind a first-order lag that starts at `past` [E]."""
     if time_constant <= 1e-3 * h:
         return u
-    start = u[:, 0] if start is None else start
     ratio = h / time_constant
     decay = math.exp(-ratio)
-    after, _ = lfilter([1 - decay], [1.0, -decay], u, axis=1, zi=decay * start[:, None])
-    before = np.concatenate((start[:, None], after[:, :-1]), axis=1)
+    after, _ = lfilter([1 - decay], [1.0, -decay], u, axis=1, zi=decay * past[:, None])
+    before = np.concatenate((past[:, None], after[:, :-1]), axis=1)
     # From s at the start of a step towards u, the mean over it is u + (s - u) (1 - decay) / ratio.
     return u + (before - u) * (-math.expm1(-ratio) / ratio)
 
 
-def lagged_step(u, time_constant, m, j, h, k):
+def lagged_step(u, time_constant, m, j, h, k, past):
     """Return the same, substep by substep; m[j] is where the lag stands."""
+    if k == 0:
+        m[j] = past
     if time_constant <= 1e-3 * h:
         m[j] = u
         return u
@@ -41,9 +39,7 @@ def lagged_step(u, time_constant, m, j, h, k):
     return u + (before - u) * (-math.expm1(-ratio) / ratio)
 
 
-@EFFECTS.register("actuator_lag")
-@final
-class ActuatorLag(InputEffect):
+class _ActuatorLag(InputEffect):
     """T du'/dt = u - u'."""
 
     name: ClassVar[str] = "actuator_lag"
@@ -55,7 +51,6 @@ class ActuatorLag(InputEffect):
     reference: ClassVar[str] = "Isermann, Mechatronic Systems, 2005, ch. 5"
     on_goal: ClassVar[bool] = True
     place_in_chain: ClassVar[int] = 70
-    memory: ClassVar[int] = 1
     helpers: ClassVar[tuple[Callable[..., float], ...]] = (lagged_step,)
     linear: ClassVar[bool] = True
     adds_pole: ClassVar[bool] = True
@@ -83,13 +78,12 @@ class ActuatorLag(InputEffect):
     substeps: ClassVar[int] = 4
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the time constant, and the range of the input that it may have followed before a record."""
-        return (Parameter("time constant", "s", 0.0, 0.25 * scales.duration), range_of_input(scales))
+        """Return the time constant."""
+        return (Parameter("time constant", "s", 0.0, 0.25 * scales.duration),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from one sample to a good part of the record."""
-        usual = [n * scales.dt for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
-        return [Start((time_constant, range_of_input(scales).low)) for time_constant in usual]
+        return [Start((n * scales.dt,)) for n in (0.7, 2.0, 5.0, 12.0) if n * scales.dt < 0.2 * scales.duration]
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the kind of output says of which order the plant is; elsewhere one pole more is just order."""
@@ -97,22 +91,48 @@ class ActuatorLag(InputEffect):
 
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
-        """Delay u by a first-order lag of p[0] seconds, which starts settled."""
-        return lagged(u, float(p[0]), h)
-
-    @staticmethod
-    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
-        """Return the same where the lag begins by `start` of the range of u beside its first value."""
-        return lagged(u, float(p[0]), h, u[:, 0] + p[1] * start)
-
-    @staticmethod
-    def step(u, p, i, m, j, h, k):
-        """Return the same, substep by substep."""
-        if k == 0:
-            m[j] = u + p[i + 1] * m[j]
-        return lagged_step(u, p[i], m, j, h, k)
+        """Delay u by a first-order lag of p[0] seconds; it starts settled."""
+        return lagged(u, float(p[0]), h, u[:, 0])
 
     @staticmethod
     def cells(p: np.ndarray, h: float) -> int:
         """Return how many numbers the step keeps."""
         return 1
+
+
+@final
+class ActuatorLagInMotion(_ActuatorLag):
+    """The same lag in records at whose start the actuator is on its way."""
+
+    memory: ClassVar[int] = 1
+
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
+        """Return the time constant, and the range of u."""
+        return (*super().parameters(scales), range_of_input(scales))
+
+    @staticmethod
+    def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
+        """Return the same where the actuator starts by `start` of the range of u beside its first value."""
+        return lagged(u, float(p[0]), h, u[:, 0] + p[1] * start)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return lagged_step(u, p[i], m, j, h, k, u + p[i + 1] * m[j])
+
+
+@EFFECTS.register("actuator_lag")
+@final
+class ActuatorLag(_ActuatorLag):
+    """T du'/dt = u - u', in records that start settled."""
+
+    refined: ClassVar[type[Effect] | None] = ActuatorLagInMotion
+
+    def as_refined(self, values: np.ndarray) -> np.ndarray:
+        """Return the lag where every record starts settled."""
+        return np.append(values, 0.0)
+
+    @staticmethod
+    def step(u, p, i, m, j, h, k):
+        """Return the same, substep by substep."""
+        return lagged_step(u, p[i], m, j, h, k, u)

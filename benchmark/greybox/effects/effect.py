@@ -128,7 +128,7 @@ def range_of_input(scales: SignalScales) -> Parameter:
 
 
 class Effect(ABC):
-    """A physical effect. Every subclass is final and sits in a file of its own; its texts are class attributes."""
+    """A physical effect, in a file of its own with its laws, which are final; its texts are class attributes."""
 
     name: ClassVar[str]
     title: ClassVar[str]

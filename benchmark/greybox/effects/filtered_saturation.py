@@ -95,7 +95,7 @@ class FilteredSaturation(InputEffect):
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return what arrives of u [E, K] behind the filter and the limits."""
         lag, low, high, second, damping, rounding, beyond = map(float, p)
-        w = lagged(u, lag, h)
+        w = lagged(u, lag, h, u[:, 0])
         if second > FAST * h:
             w = second_order(np.ascontiguousarray(w), second, damping, h)
         high = max(low, high)
@@ -107,9 +107,7 @@ class FilteredSaturation(InputEffect):
     @staticmethod
     def step(u, p, i, m, j, h, k):
         """Return the same, substep by substep; it keeps the lag, and x and x' of the filter behind it."""
-        if k == 0:
-            m[j] = u
-        w = lagged_step(u, p[i], m, j, h, k)
+        w = lagged_step(u, p[i], m, j, h, k, u)
         t = p[i + 3]
         if k == 0:
             m[j + 1] = w

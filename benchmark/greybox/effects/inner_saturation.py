@@ -61,14 +61,12 @@ class InnerSaturation(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u behind a lag of p[0] seconds, clipped to p[1] .. p[2]."""
-        return np.clip(lagged(u, float(p[0]), h), p[1], max(p[1], p[2]))
+        return np.clip(lagged(u, float(p[0]), h, u[:, 0]), p[1], max(p[1], p[2]))
 
     @staticmethod
     def step(u, p, i, m, j, h, k):
         """Return the same, substep by substep."""
-        if k == 0:
-            m[j] = u
-        return min(max(lagged_step(u, p[i], m, j, h, k), p[i + 1]), max(p[i + 1], p[i + 2]))
+        return min(max(lagged_step(u, p[i], m, j, h, k, u), p[i + 1]), max(p[i + 1], p[i + 2]))
 
     @staticmethod
     def cells(p: np.ndarray, h: float) -> int:
