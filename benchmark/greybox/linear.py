@@ -75,24 +75,28 @@ def find_baseline(
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
-        if any(_takes_its_place(fit, baseline) for term in instead for fit in _laws(other, term)):
+        if any(_takes_its_place(fit, simpler, baseline) for term in instead for fit in _laws(other, term)):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
     return baseline if smooth is None else baseline_of(smooth)
 
 
-def _laws(simpler: Baseline, term: Term) -> Iterator[Estimate]:
+def _laws(baseline: Baseline, term: Term) -> Iterator[Estimate]:
     """Fit an effect to a simpler plant, then the form of its law that has more numbers."""
-    fit = add(simpler, simpler.estimate, term)
+    fit = add(baseline, baseline.estimate, term)
     yield fit
-    if (fine := refine(simpler, fit, term)) is not None:
+    if (fine := refine(baseline, fit, term)) is not None:
         yield fine
 
 
-def _takes_its_place(other: Estimate, baseline: Baseline) -> bool:
-    """Tell whether a model does as well as the plain one, and no order of as few parameters as well as that model."""
-    if not _does_as_well(baseline, other, baseline.estimate):
+def _takes_its_place(other: Estimate, simpler: Estimate, baseline: Baseline) -> bool:
+    """Tell whether an effect on a simpler plant does as well as the plain model.
+
+    It must simulate held-out data better than the simpler plant, and no order of as few parameters do as well as it.
+    """
+    held_out, without = map(baseline.held_out_errors, (other, simpler))
+    if held_out.mean() >= without.mean() or not _does_as_well(baseline, other, baseline.estimate):
         return False
     as_few = [fit for fit in baseline.orders if fit.plant.free.sum() <= other.plant.free.sum()]
     return not any(_does_as_well(baseline, fit, other) for fit in as_few)

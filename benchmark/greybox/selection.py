@@ -25,7 +25,7 @@ from simgap.greybox.held_out import in_most
 from simgap.greybox.noise import log_likelihood
 from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
-from simgap.greybox.trial import Trial, assess, assessed, holds_out, judged, ranked, significant
+from simgap.greybox.trial import Trial, assess, assessed, beyond_chance, holds_out, judged, ranked, significant
 from simgap.stages import stage
 
 # Log-likelihood ratio that confirms what the readings show already.
@@ -192,10 +192,27 @@ class _Search:
             self.noise_order, trial, trials = judged(self.baseline, trial, fits, self.noise_order)
             self.rounds.append(Round(trial, trials))
             better = ranked([other for other in trials if significant(self.baseline, trial, other)])
+            better = better or self._two_at_once(trial, trials, *asked)
             if not better:
                 break
             trial = better[0]
         return trial
+
+    def _two_at_once(self, trial: Trial, trials: Sequence[Trial], *asked: Among) -> list[Trial]:
+        """Add two effects of which the first simulates held-out data no better without the second.
+
+        The first makes the next sample likelier, in training and held out: a lag of the sensor, beside a friction that
+        leads free runs astray.
+        """
+        likelier = [
+            other for other in trials if other.valid > trial.valid and beyond_chance(self.baseline, trial, other)
+        ]
+        if not likelier or len(trial.terms) + 2 > self.baseline.plant.most_terms:
+            return []
+        first = max(likelier, key=lambda other: other.score)
+        fits = with_any_more(self.baseline, first.estimate, self.extended, *asked)
+        pairs = assessed(self.baseline, fits, self.noise_order)
+        return ranked([two for two in pairs if all(significant(self.baseline, one, two) for one in (trial, first))])
 
     def backward(self, trial: Trial) -> Trial:
         """Take out, one by one, what no longer passes alone against the rest; what stays does.

@@ -121,7 +121,12 @@ def score_gain(one: Baseline, estimate: Estimate, other: Baseline, without: Esti
 
 
 def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
-    """Tell whether the larger model says more than noise would make it say, in training and in held-out data.
+    """Tell whether the larger model says more than noise would make it say, in training and in held-out data."""
+    return beyond_chance(baseline, smaller, larger) and holds_out(baseline, smaller, larger)
+
+
+def beyond_chance(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
+    """Tell whether the larger model says more of the training data than noise would make it say, and enough.
 
     2 log(L_larger / L_smaller) ~ chi2(extra parameters) under noise alone (Wilks 1938), times the number tried. L is
     that of one-step errors, or of free runs: an effect may take most of what is wrong in the long run and leave the
@@ -131,7 +136,7 @@ def significant(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     extra = max(1, larger.k - smaller.k + larger.k_train - smaller.k_train)
     tried = len(candidates(baseline, smaller.terms)) * STARTS
     chance = chi2.sf(max(0.0, 2 * ratio), extra) * tried * WAYS
-    return bool(chance < FALSE_NAMES and _matters(baseline, smaller, larger) and holds_out(baseline, smaller, larger))
+    return bool(chance < FALSE_NAMES and _matters(baseline, smaller, larger))
 
 
 def _matters(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:

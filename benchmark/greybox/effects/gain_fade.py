@@ -20,11 +20,12 @@ class GainFade(InputEffect):
     title: ClassVar[str] = "a gain that fades with time"
     explanation: ClassVar[str] = (
         "The same input achieves less and less in the course of each experiment: a battery that runs down, a winding "
-        "that warms up, oil that changes with temperature."
+        "that warms up, a filter that clogs, oil that changes with temperature."
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
     place_in_chain: ClassVar[int] = 20
     of_time: ClassVar[bool] = True
+    instead_of_order: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record at rest without input: a drift is still there, a fading gain has nothing to act on",
