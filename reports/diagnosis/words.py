@@ -131,7 +131,8 @@ def of_numbers(findings: Findings) -> str:
     units = [parameter.unit for cause in findings.effects for parameter in cause.parameters]
     per_mass = " Forces are per unit of mass or inertia, which these records do not tell."
     ranges = "Ranges in brackets are 95 % intervals where nothing else is said."
-    return ranges + per_mass * any(unit.endswith("/s^2") for unit in units)
+    of_motion = {"position", "velocity"} & set(findings.kinds.values())
+    return ranges + per_mass * (bool(of_motion) and any(unit.endswith("/s^2") for unit in units))
 
 
 def runner_up(findings: Findings) -> str:

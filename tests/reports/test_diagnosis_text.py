@@ -86,6 +86,12 @@ def test_a_cause_that_explains_free_runs_alone_says_so(named):
     ) in in_one_line(diagnosis_text(replace(named, causes=(cause,))))
 
 
+@pytest.mark.parametrize(("kind", "said"), [("position", True), ("velocity", True), ("other", False)])
+def test_only_of_motions_forces_are_per_unit_of_mass(named, kind, said):
+    text = in_one_line(diagnosis_text(replace(named, kinds=dict.fromkeys(named.kinds, kind))))
+    assert ("Forces are per unit of mass" in text) == said
+
+
 def test_a_suspect_that_helps_a_simulation_worse_than_the_mean_says_so(suspected):
     gain = replace(suspected.gain, low=0.05, beats_mean=False)
     assert in_one_line(diagnosis_text(replace(suspected, gain=gain))).startswith(
