@@ -53,7 +53,7 @@ def test_a_name_that_the_test_data_do_not_confirm_is_a_suspect(suspected):
     assert suspected.causes == ()
     assert [cause.effect for cause in suspected.suspects] == ["coulomb_friction"]
     assert suspected.findings.gain.low <= 0
-    assert "Suspected, not shown: Coulomb friction." in " ".join(str(suspected).split())
+    assert "Nothing is named. The training data ask for Coulomb friction, but" in " ".join(str(suspected).split())
 
 
 def test_gain_and_traces_are_those_of_the_model_with_the_suspects(suspected, oiled):

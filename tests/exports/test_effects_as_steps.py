@@ -41,11 +41,15 @@ def test_an_input_passes_step_by_step_as_it_does_as_a_whole(effect, memory):
 
 
 @pytest.mark.parametrize("effect", effects_of(OutputEffect), ids=lambda e: e.name)
-def test_a_reading_is_the_same_sample_by_sample(effect):
+@pytest.mark.parametrize("memory", [0.0, -0.7])
+def test_a_reading_is_the_same_sample_by_sample(effect, memory):
     y, t = signal(1), 0.1 * np.arange(T)
     for values in values_of(effect, scales()):
-        whole = effect.term(y[None].copy(), values, t)[0]
-        np.testing.assert_allclose(stepped(effect, values, y, 0.1), whole, rtol=0, atol=1e-12)
+        if effect.memory:
+            whole = effect.term_from(y[None].copy(), values, t, np.array([memory]))[0]
+        else:
+            whole = effect.term(y[None].copy(), values, t)[0]
+        np.testing.assert_allclose(stepped(effect, values, y, 0.1, memory), whole, rtol=0, atol=1e-12)
 
 
 def test_every_effect_that_is_simulated_is_forecast_or_has_a_step():

@@ -110,6 +110,10 @@ class ActuatorLagInMotion(_ActuatorLag):
         """Return the time constant, and the range of u."""
         return (*super().parameters(scales), range_of_input(scales))
 
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from the same lags."""
+        return [Start((*start.values, range_of_input(scales).low)) for start in super().starts(scales)]
+
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
         """Return the same where the actuator starts by `start` of the range of u beside its first value."""

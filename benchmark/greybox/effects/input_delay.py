@@ -85,6 +85,10 @@ class DelayInMotion(_Delay):
         """Return the delay, and the range of u."""
         return (*super().parameters(scales), range_of_input(scales))
 
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from the same delays."""
+        return [Start((*start.values, range_of_input(scales).low)) for start in super().starts(scales)]
+
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
         """Return the same where u stood by `start` of its range beside its first value."""

@@ -96,6 +96,10 @@ class SensorLagInMotion(_SensorLag):
         of_reading = Parameter("range of the reading", scales.y_unit, reach, reach, fixed=True, told=False)
         return (*super().parameters(scales), of_reading)
 
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from the same lags."""
+        return [Start((*start.values, scales.y_high - scales.y_low)) for start in super().starts(scales)]
+
     @staticmethod
     def term_from(y: np.ndarray, p: np.ndarray, t: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Return the same where the reading starts by `start` of its range beside y."""
