@@ -15,7 +15,8 @@ from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, with_plain
 from simgap.greybox.position_and_velocity import with_kind
-from simgap.greybox.selection import BETTER, Selection
+from simgap.greybox.search import BETTER
+from simgap.greybox.selection import Selection
 from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, MATTERS_AT_ALL, halves_speak_for, score_gain
 from simgap.records import Channels, TrainingSet
 

@@ -15,7 +15,8 @@ from simgap.greybox.linear import first_order_hold, with_plain
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_plain
 from simgap.greybox.score_test import candidates
-from simgap.greybox.selection import BETTER, Selection, select
+from simgap.greybox.search import BETTER
+from simgap.greybox.selection import Selection, select
 from simgap.greybox.trial import MATTERS, score_gain
 from simgap.records import Channels
 

@@ -22,7 +22,8 @@ from simgap.greybox.model import FittedPlant
 from simgap.greybox.samples import Records
 from simgap.greybox.score_test import candidates as _candidates
 from simgap.greybox.score_test import score_tests
-from simgap.greybox.selection import Selection, _Search, passes, select
+from simgap.greybox.search import Search, passes
+from simgap.greybox.selection import Selection, select
 from simgap.greybox.trial import Trial, assess, assessed, squares_crosswise
 from simgap.greybox.trial import ranked as _ranked
 from simgap.greybox.trial import significant as _significant
@@ -85,6 +86,12 @@ def refined(search, name):
     return refine(search, add(search, search.estimate, term(name)), term(name))
 
 
+def added_where_free_runs_need(search, together):
+    """The effects that a search adds where free runs get better with so many of them, and not with fewer."""
+    with patch("simgap.greybox.trial.holds_out", lambda _, smaller, larger: len(larger.terms) >= together):
+        return Search(search).forward(assess(search, search.estimate, 0), "forecast").names
+
+
 def best_of_round(search):
     """The plain model and the best of all its extensions by one effect."""
     fits = with_any_more(search, search.estimate, {})
@@ -110,12 +117,12 @@ def sizes_of(trial):
 
 def pruned(search, trial):
     """What is left of a trial's effects without the superfluous ones."""
-    return _Search(search).backward(trial).names
+    return Search(search).backward(trial).names
 
 
 def without_each(search, trial):
     """Squared errors without each effect of a pruned trial: as pruning left them, and fitted anew."""
-    pruning = _Search(search)
+    pruning = Search(search)
     trial = pruning.backward(trial)
     chosen = Selection(search, trial, pruning.noise_order, (), {}, dict(pruning.parts))
     anew = replace(chosen, parts={})

@@ -8,7 +8,7 @@ import pytest
 from simgap.data.simulated.rigs import hide
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
-from simgap.greybox.selection import _Search
+from simgap.greybox.search import Search
 from simgap.greybox.trial import Trial, assess
 
 
@@ -41,7 +41,7 @@ def _modules_entered(work):
 def test_models_pass_through_a_round_with_at_most_six_changes_of_module_and_two_returns():
     training = hide("cart", {"coulomb_friction": 1.0}, seed=1).training
     baseline = find_baseline(training.train, training.valid, training.channels, (0,), training.n_init)
-    trial, search = assess(baseline, baseline.estimate, 0), _Search(baseline)
+    trial, search = assess(baseline, baseline.estimate, 0), Search(baseline)
     entered = _modules_entered(lambda: search.forward(trial, "forecast"))
     ends = [i + 1 for i, module in enumerate(entered) if module == "trial"]
     assert len(ends) == len(search.rounds) == 2

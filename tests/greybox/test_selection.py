@@ -5,7 +5,17 @@ import pytest
 
 from simgap.data.simulated.rigs import hide
 
-from .building import added_to, in_order, passing_alone, plain_search, pruned, sizes_of, with_effects, without_each
+from .building import (
+    added_to,
+    added_where_free_runs_need,
+    in_order,
+    passing_alone,
+    plain_search,
+    pruned,
+    sizes_of,
+    with_effects,
+    without_each,
+)
 from .parts import experiments
 from .plants import free_run, steps, velocity
 
@@ -28,6 +38,11 @@ def test_an_effect_that_is_not_there_is_taken_out_again(search):
 
 def test_effects_that_are_there_stay(search):
     assert set(pruned(search, with_effects(search, "constant_load", "dead_zone"))) == {"constant_load", "dead_zone"}
+
+
+@pytest.mark.parametrize(("together", "added"), [(2, {"constant_load", "dead_zone"}), (3, set())])
+def test_two_effects_are_added_at_once_where_free_runs_get_no_better_with_one_of_them(search, together, added):
+    assert set(added_where_free_runs_need(search, together)) == added
 
 
 def test_what_pruning_has_fitted_is_what_a_fit_without_each_effect_gives(search):
