@@ -158,8 +158,10 @@ def _time(table: Table, column: str | None) -> tuple[Clock | None, float | None,
 
 def _column(table: Table, heading: str) -> tuple[Column, np.ndarray, np.ndarray]:
     """Look at a column; with the rows in which there is a number, and these numbers."""
-    there = np.flatnonzero(~missing_in(table.cells_of(heading)))
-    values, known = (table.only(there) if there.size else table).numbers(heading), table.heading(heading)
+    cells, known = table.cells_of(heading), table.heading(heading)
+    there = np.flatnonzero(~missing_in(cells))
+    alone = replace(table, names=(heading,), cells=(cells,))
+    values = (alone.only(there) if there.size else alone).numbers(heading)
     kind = kind_of(known.name, known.unit) or ""
     low, high = float(values.min()), float(values.max())
     return Column(heading, known.name, known.unit, _role(known.name, kind), kind, low, high), there, values

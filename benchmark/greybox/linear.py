@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -35,6 +36,8 @@ WORTH_AN_ORDER = 0.015
 SMOOTH = 20.0
 EARLY = 0.25  # samples
 UNEXPLAINED = 0.5  # share of the output's variance
+
+HeldOut = Callable[[Estimate], np.ndarray]  # the squared errors of held-out blocks
 
 
 def find_baseline(
@@ -71,11 +74,14 @@ def find_baseline(
         return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
     baseline = baseline_of(models[-1])
+    held_out_errors = cache(baseline.held_out_errors)  # of orders that many candidates are compared with
     for simpler in (fit for fit in models[:-1] if fit.plant.by_rate or not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
         other = baseline_of(simpler)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
-        if any(_takes_its_place(fit, simpler, baseline) for term in instead for fit in _laws(other, term)):
+        if any(
+            _takes_its_place(fit, simpler, baseline, held_out_errors) for term in instead for fit in _laws(other, term)
+        ):
             baseline = other
             break
     smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
@@ -90,23 +96,21 @@ def _laws(baseline: Baseline, term: Term) -> Iterator[Estimate]:
         yield fine
 
 
-def _takes_its_place(other: Estimate, simpler: Estimate, baseline: Baseline) -> bool:
+def _takes_its_place(other: Estimate, simpler: Estimate, baseline: Baseline, held_out_errors: HeldOut) -> bool:
     """Tell whether an effect on a simpler plant does as well as the plain model.
 
     It must simulate held-out data better than the simpler plant, and no order of as few parameters do as well as it.
     """
-    held_out, without = map(baseline.held_out_errors, (other, simpler))
-    if held_out.mean() >= without.mean() or not _does_as_well(baseline, other, baseline.estimate):
+
+    def does_as_well(one: Estimate, another: Estimate) -> bool:
+        if in_most(held_out_errors(one) - held_out_errors(another)):  # it errs more, as nearly all do, at less cost
+            return False
+        return score_gain(baseline, one, baseline, another) > 0
+
+    if held_out_errors(other).mean() >= held_out_errors(simpler).mean() or not does_as_well(other, baseline.estimate):
         return False
     as_few = [fit for fit in baseline.orders if fit.plant.free.sum() <= other.plant.free.sum()]
-    return not any(_does_as_well(baseline, fit, other) for fit in as_few)
-
-
-def _does_as_well(baseline: Baseline, one: Estimate, other: Estimate) -> bool:
-    """Tell whether a model does not err more than another in most held-out blocks, and scores higher."""
-    if in_most(baseline.held_out_errors(one) - baseline.held_out_errors(other)):  # as nearly all do, at less cost
-        return False
-    return score_gain(baseline, one, baseline, other) > 0
+    return not any(does_as_well(fit, other) for fit in as_few)
 
 
 def scaled(plain: Estimate, records: Records, channels: Channels, outputs: Sequence[int]) -> Estimate:

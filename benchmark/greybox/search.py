@@ -141,8 +141,7 @@ class Search:
         if not likelier or len(trial.terms) + 2 > self.baseline.plant.most_terms:
             return []
         first = max(likelier, key=lambda other: other.score)
-        fits = with_any_more(self.baseline, first.estimate, self.extended, *asked)
-        pairs = assessed(self.baseline, fits, self.noise_order)
+        pairs = self._one_more(first, *asked)
         return ranked([two for two in pairs if all(significant(self.baseline, one, two) for one in (trial, first))])
 
     def backward(self, trial: Trial) -> Trial:
@@ -196,9 +195,11 @@ class Search:
         """List the models with another effect in the place of one, the best first."""
         stage(f"Trying others in the place of {term.effect.title}")
         rest = self._without(trial, term)
-        fits = with_any_more(self.baseline, rest.estimate, self.extended, *asked)
-        trials = assessed(self.baseline, fits, self.noise_order)
-        return ranked([other for other in trials if significant(self.baseline, rest, other)])
+        return ranked([other for other in self._one_more(rest, *asked) if significant(self.baseline, rest, other)])
+
+    def _one_more(self, trial: Trial, *asked: Among) -> list[Trial]:
+        fits = with_any_more(self.baseline, trial.estimate, self.extended, *asked)
+        return assessed(self.baseline, fits, self.noise_order)
 
     def _assess(self, estimate: Estimate) -> Trial:
         return assess(self.baseline, estimate, self.noise_order)

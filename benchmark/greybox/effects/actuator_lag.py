@@ -10,7 +10,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start, range_of_input
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.in_motion import InMotion
 from simgap.registry import EFFECTS
 
 
@@ -101,18 +102,8 @@ class _ActuatorLag(InputEffect):
 
 
 @final
-class ActuatorLagInMotion(_ActuatorLag):
+class ActuatorLagInMotion(InMotion, _ActuatorLag):
     """The same lag in records at whose start the actuator is on its way."""
-
-    memory: ClassVar[int] = 1
-
-    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the time constant, and the range of u."""
-        return (*super().parameters(scales), range_of_input(scales))
-
-    def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from the same lags."""
-        return [Start((*start.values, range_of_input(scales).low)) for start in super().starts(scales)]
 
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:

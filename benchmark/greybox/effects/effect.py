@@ -121,12 +121,6 @@ class Start(NamedTuple):
     amplitude: int | None = None
 
 
-def range_of_input(scales: SignalScales) -> Parameter:
-    """Return the range in which an input stood before a record begins."""
-    reach = scales.u_high - scales.u_low
-    return Parameter("range of the input", scales.u_unit, reach, reach, fixed=True, told=False)
-
-
 class Effect(ABC):
     """A physical effect, in a file of its own with its laws, which are final; its texts are class attributes."""
 

@@ -8,7 +8,8 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start, range_of_input
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.in_motion import InMotion
 from simgap.registry import EFFECTS
 
 
@@ -76,18 +77,8 @@ class _Delay(InputEffect):
 
 
 @final
-class DelayInMotion(_Delay):
+class DelayInMotion(InMotion, _Delay):
     """The same delay in records before which u stood elsewhere."""
-
-    memory: ClassVar[int] = 1
-
-    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the delay, and the range of u."""
-        return (*super().parameters(scales), range_of_input(scales))
-
-    def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from the same delays."""
-        return [Start((*start.values, range_of_input(scales).low)) for start in super().starts(scales)]
 
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.in_motion import InMotion
 from simgap.registry import EFFECTS
 
 
@@ -85,20 +86,8 @@ class _SensorLag(OutputEffect):
 
 
 @final
-class SensorLagInMotion(_SensorLag):
+class SensorLagInMotion(InMotion, _SensorLag):
     """The same lag in records at whose start the reading is on its way."""
-
-    memory: ClassVar[int] = 1
-
-    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the time constant, and the range of the reading."""
-        reach = scales.y_high - scales.y_low
-        of_reading = Parameter("range of the reading", scales.y_unit, reach, reach, fixed=True, told=False)
-        return (*super().parameters(scales), of_reading)
-
-    def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from the same lags."""
-        return [Start((*start.values, scales.y_high - scales.y_low)) for start in super().starts(scales)]
 
     @staticmethod
     def term_from(y: np.ndarray, p: np.ndarray, t: np.ndarray, start: np.ndarray) -> np.ndarray:
