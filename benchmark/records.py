@@ -70,7 +70,8 @@ class Channels:
 class Experiment:
     """One uninterrupted record: u [T, nu], y [T, ny], sampled every dt seconds.
 
-    The arrays are float64, two-dimensional and read-only. `experiment[a:b]` is the record of those samples.
+    The arrays are float64, two-dimensional and read-only. `experiment[a:b]` is the record of those samples, which
+    knows for how long the machine had run before them: `since`, in seconds.
     Raises UnusableInput when the shapes do not fit, dt is not positive, or a value is not finite.
     """
 
@@ -78,6 +79,7 @@ class Experiment:
     u: Float[np.ndarray, "T nu"]
     y: Float[np.ndarray, "T ny"]
     dt: float
+    since: float = 0.0
 
     def __post_init__(self) -> None:
         for column in ("u", "y"):
@@ -108,12 +110,13 @@ class Experiment:
 
     def __reduce__(self) -> tuple[type[Experiment], tuple[Any, ...]]:
         """Arrays come out of a pickle writable; made anew, they are not."""
-        return type(self), (self.name, self.u, self.y, self.dt)
+        return type(self), (self.name, self.u, self.y, self.dt, self.since)
 
     def __getitem__(self, samples: slice) -> Experiment:
         if not isinstance(samples, slice) or samples.step not in (None, 1):
             raise TypeError("an experiment is cut with a plain slice such as experiment[100:200]")
-        return Experiment(self.name, self.u[samples], self.y[samples], self.dt)
+        since = self.since + self.dt * samples.indices(len(self))[0]
+        return Experiment(self.name, self.u[samples], self.y[samples], self.dt, since)
 
 
 @dataclass(frozen=True, eq=False)

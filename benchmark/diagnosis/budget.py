@@ -45,7 +45,7 @@ def budgets(
     model, after = (named.model, named.after) if named else (plain, before)
     n, rest = dataset.n_init, learn(model, seed)
     learnt = [
-        y_hat + rest.predict(x.u[None], model.simulate_whole(x.u[None], x.y[None, :n]))[0, n:]
+        y_hat + rest.predict(x.u[None], model.simulate_whole(x.u[None], x.y[None, :n], np.array([x.since])))[0, n:]
         for x, y_hat in zip(dataset.test, after, strict=True)
     ]
     of_plain, of_named = _mse(dataset, before), _mse(dataset, after)

@@ -28,8 +28,8 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
     looked_at = excerpts if dataset.channels.plant is None else spread
     if is_cut(looked_at(training.train), training.train):
         sentences.append(
-            f"There are many training samples, so causes are looked for in pieces of {PIECE}: what depends on the time "
-            "since the start, such as a gain that fades or a periodic disturbance, cannot show."
+            f"There are many training samples, so causes are looked for in pieces of {PIECE}: what changes from one "
+            "experiment to the next, such as a drift of the sensor, cannot show."
         )
     for i, channel in enumerate(dataset.channels.outputs):
         y = np.concatenate([x.y[:, i] for x in training.train])

@@ -25,7 +25,7 @@ SMALLEST_ERROR = 1e-9
 
 def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
     """Simulate rows n_init .. T-1 of one experiment from its first n_init samples."""
-    return model.simulate(experiment.u[None], experiment.y[None, :n_init])[0]
+    return model.simulate(experiment.u[None], experiment.y[None, :n_init], np.array([experiment.since]))[0]
 
 
 def measure(
@@ -67,8 +67,8 @@ def in_pieces(dataset: Dataset, plain: GreyBoxModel, model: GreyBoxModel) -> InP
     pieces = [x[a : a + PIECE] for x in dataset.test for a in range(0, len(x) - PIECE + 1, PIECE)]
     if not pieces:
         return None
-    u, y = np.stack([x.u for x in pieces]), np.stack([x.y for x in pieces])
-    before, after = (list(one.simulate(u, y[:, : dataset.n_init])) for one in (plain, model))
+    u, y, since = (np.stack([getattr(x, signal) for x in pieces]) for signal in ("u", "y", "since"))
+    before, after = (list(one.simulate(u, y[:, : dataset.n_init], since)) for one in (plain, model))
     gain = measure(replace(dataset, test=tuple(pieces)), before, after)
     return InPieces(PIECE, gain.share, gain.low, gain.high)
 

@@ -21,7 +21,9 @@ def odd_runs(model: Any, dataset: Dataset) -> tuple[str, ...]:
     runs: Sequence[Experiment] = [x for x in (*training.train, *training.valid, *dataset.test) if len(x) > n]
     if dataset.channels.plant is None or len(runs) < FEWEST:
         return ()
-    errors = np.array([np.mean(np.abs(model.simulate(x.u[None], x.y[None, :n])[0] - x.y[n:])) for x in runs])
+    errors = np.array(
+        [np.mean(np.abs(model.simulate(x.u[None], x.y[None, :n], np.array([x.since]))[0] - x.y[n:])) for x in runs]
+    )
     usual, unit = float(np.median(errors)), dataset.channels.outputs[0].unit
     odd = [i for i in np.argsort(-errors) if errors[i] > FAR * usual][:MOST_NAMED]
     return tuple(

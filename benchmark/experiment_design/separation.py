@@ -115,4 +115,5 @@ def _with_one_more(records: Records, u: np.ndarray, y: np.ndarray) -> Records:
     mask = np.zeros((len(records.u) + 1, longest), dtype=bool)
     mask[:-1, : records.mask.shape[1]] = records.mask
     mask[-1, : len(u)] = True
-    return Records(joined(records.u, u), joined(records.y, y), mask, records.dt, records.soft)
+    since = np.append(records.since, 0.0)
+    return Records(joined(records.u, u), joined(records.y, y), mask, records.dt, since, records.soft)

@@ -19,8 +19,11 @@ def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]
 class Drive:
     """What drives one plant on the inputs of several experiments, u [E, T, nu]."""
 
-    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"]) -> None:
+    def __init__(
+        self, plant: Plant, u: Float[np.ndarray, "E T nu"], since: Float[np.ndarray, " E"] | None = None
+    ) -> None:
         self.plant, self.substeps = plant, plant.substeps
+        self.since = np.zeros(len(u)) if since is None else since
         self.h = plant.dt / plant.substeps
         # [nu, E, K]: each sample until the next one
         self.u = np.ascontiguousarray(np.repeat(np.moveaxis(u, 2, 0), plant.substeps, axis=2))
@@ -93,6 +96,8 @@ class Drive:
                 assert isinstance(term.effect, InputEffect)
                 if term.key in begun:
                     u = term.effect.term_from(u, p, self.h, begun[term.key])
+                elif term.effect.of_time:
+                    u = term.effect.term_since(u, p, self.h, self.since)
                 else:
                     u = term.effect.term(u, p, self.h)
             if len(self._arrived) > 1 + len(values):

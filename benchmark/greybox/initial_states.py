@@ -69,7 +69,9 @@ def usual_start(plant: Plant, estimate: Estimate, records: Records, noise: Noise
         mean, scatter = _of_starts(estimate.local[:, :q])
         runs = records
     else:
-        passed = Simulator(plant, records.u).states(estimate.theta[None], estimate.local[None, :, : plant.n_moving])
+        passed = Simulator(plant, records.u, records.since).states(
+            estimate.theta[None], estimate.local[None, :, : plant.n_moving]
+        )
         states = passed[0][records.mask][:, :q]
         if len(states) <= q or not np.max(np.abs(states)) < LARGEST_ERROR:  # it grows without bound
             return None

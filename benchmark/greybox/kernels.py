@@ -23,9 +23,9 @@ SLOTS = 5  # force terms that one model may have; the tuple has this length, so 
 # In the order of simgap.greybox.effects.effect.Role.
 FORCE, FRICTION, OUTFLOW, RIM, STOP, BRAKING = range(6)
 
-_matrix, _cube, _places = types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
+_row, _matrix, _cube, _places = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 _loop = types.void(
-    _cube, _cube, _cube, _matrix, _matrix, types.int64, _cube, _cube, types.int64, types.float64,
+    _cube, _cube, _cube, _matrix, _matrix, types.int64, _cube, _cube, _row, types.int64, types.float64,
     types.UniTuple(types.FunctionType(TERM), SLOTS), _places, _matrix, _places, _places, _cube,
     types.float64[:, :, :, ::1],
 )  # fmt: skip
@@ -82,7 +82,7 @@ def dry_friction(v, new, gain, hold):
 
 @directly(_loop)
 def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in registers
-    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, begun, states
+    es, g0s, g1s, rates, seen, entry, drive, start, since, substeps, h, terms, until, thetas, p_at, m_at, begun, states
 ):
     """Fill states [S, E, T, n] of a body, for S parameter vectors thetas [S, p], from start [S, E, n].
 
@@ -121,6 +121,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
             if k == samples - 1:
                 break
             for _ in range(substeps):
+                t = since[experiment] + step * h
                 for s in range(runs):
                     z0, z1, z2, z3 = z[s, 0], z[s, 1], z[s, 2], z[s, 3]
                     x, v = z0, z1 if n > 1 else z0
@@ -129,7 +130,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                     u, p, m = drive[s, experiment, step], pointer(thetas[s]), pointer(held[s])
                     force = 0.0
                     for q in range(until[FORCE]):
-                        force += terms[q](x, v, step * h, h, p, p_at[q], m, m_at[q])
+                        force += terms[q](x, v, t, h, p, p_at[q], m, m_at[q])
                     hold = 0.0
                     for q in range(until[FORCE], until[FRICTION]):
                         if m_at[q] < m_at[q + 1]:
@@ -137,7 +138,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                             c = rates[s]
                             held[s, m_at[q]] = u + (c[0] * z0 + c[1] * z1 + c[2] * z2 + c[3] * z3) - force
                             held[s, m_at[q] + 1] = c[4] * v
-                        hold += terms[q](x, v, step * h, h, p, p_at[q], m, m_at[q])
+                        hold += terms[q](x, v, t, h, p, p_at[q], m, m_at[q])
                     rise = force - before[s] if step > 0 else 0.0
                     a, a0, a1, a2, a3 = e[s], g0[s, 0], g0[s, 1], g0[s, 2], g0[s, 3]
                     b0, b1, b2, b3 = g1[s, 0], g1[s, 1], g1[s, 2], g1[s, 3]
@@ -173,7 +174,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
                             new1 = min(new1, 0.0) if new0 > end else max(new1, 0.0)
                             new0 = end
                     for q in range(until[STOP], until[BRAKING]):
-                        most = terms[q](z0, v, step * h, h, p, p_at[q], m, m_at[q])
+                        most = terms[q](z0, v, t, h, p, p_at[q], m, m_at[q])
                         rate = new1 if n > 1 else (new0 - z0) / h
                         kept = max(rate, -most) if z0 > 0.0 else min(rate, most) if z0 < 0.0 else rate
                         if kept != rate and n > 1:
@@ -191,7 +192,7 @@ def run_body(  # noqa: PLR0912, PLR0915 - one loop, so that it stays in register
 
 @directly(_loop)
 def run_tanks(  # noqa: PLR0912 - as above
-    es, g0s, g1s, rates, seen, entry, drive, start, substeps, h, terms, until, thetas, p_at, m_at, begun, states
+    es, g0s, g1s, rates, seen, entry, drive, start, since, substeps, h, terms, until, thetas, p_at, m_at, begun, states
 ):
     """Fill states [S, E, T, n] of a cascade of tanks, as run_body does; forces act on the first one as inflows."""
     _, experiments, samples, n = states.shape
@@ -211,15 +212,16 @@ def run_tanks(  # noqa: PLR0912 - as above
             if k == samples - 1:
                 break
             for _ in range(substeps):
+                t = since[experiment] + step * h
                 for i in range(n):
                     flow[i] = 0.0
                 for q in range(until[FORCE]):
-                    flow[entry] += terms[q](z[0], z[0], step * h, h, p, p_at[q], held, m_at[q])
+                    flow[entry] += terms[q](z[0], z[0], t, h, p, p_at[q], held, m_at[q])
                 for q in range(until[FRICTION], until[OUTFLOW]):
                     for i in range(n):
                         # In units of the last tank's level, so that one law serves tanks of any size.
                         level = z[i] * rates[s, i] / (last + 1e-300)
-                        out = last * terms[q](level, 0.0, step * h, h, p, p_at[q], held, m_at[q])
+                        out = last * terms[q](level, 0.0, t, h, p, p_at[q], held, m_at[q])
                         flow[i] -= out
                         if i + 1 < n:
                             flow[i + 1] += out
@@ -250,18 +252,19 @@ def run_tanks(  # noqa: PLR0912 - as above
         _matrix,
         _matrix,
         _matrix,
+        _row,
         types.float64,
         types.UniTuple(types.FunctionType(TERM), SLOTS),
         _places,
-        types.float64[::1],
+        _row,
         _places,
         _places,
         _matrix,
-        types.float64[::1],
+        _row,
         _cube,
     )
 )
-def follow_motion(drive, motion, velocity, dt, terms, until, theta, p_at, m_at, begun, memory, states):
+def follow_motion(drive, motion, velocity, since, dt, terms, until, theta, p_at, m_at, begun, memory, states):
     """Fill states [E, T, 2] with the force that an imposed motion [E, T] takes, and with the rate of the drive [E, T].
 
     Where it stands still, dry friction goes on holding as it did before.
@@ -277,12 +280,12 @@ def follow_motion(drive, motion, velocity, dt, terms, until, theta, p_at, m_at, 
             rate = (drive[experiment, after] - drive[experiment, before]) / (max(after - before, 1) * dt)
             if v != 0.0:
                 side = 1.0 if v > 0.0 else -1.0
-            force = drive[experiment, k]
+            t, force = since[experiment] + k * dt, drive[experiment, k]
             for q in range(until[FORCE]):
-                force -= terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
+                force -= terms[q](x, v, t, h, p, p_at[q], held, m_at[q])
             for q in range(until[FORCE], until[FRICTION]):
                 if m_at[q] < m_at[q + 1]:
                     memory[m_at[q]] = force
-                force += side * terms[q](x, v, k * dt, h, p, p_at[q], held, m_at[q])
+                force += side * terms[q](x, v, t, h, p, p_at[q], held, m_at[q])
             states[experiment, k, 0] = force
             states[experiment, k, 1] = rate

@@ -14,12 +14,12 @@ _places, _terms = types.int64[::1], types.UniTuple(types.FunctionType(TERM), SLO
 
 @directly(
     types.void(
-        types.boolean, _matrix, _matrix, _matrix, _matrix, _row, _row, _row, _matrix, types.int64, types.float64,
+        types.boolean, _matrix, _matrix, _matrix, _matrix, _row, _row, _row, _matrix, _row, types.int64, types.float64,
         _terms, _places, _row, _places, _places, _row, _terms, _places, types.int64, _cube,
     )
 )  # fmt: skip
 def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
-    loop, goal, gain, supply, enabled, inertias, weights, numbers, start, substeps, h,
+    loop, goal, gain, supply, enabled, inertias, weights, numbers, start, since, substeps, h,
     terms, until, theta, p_at, m_at, memory, commands, c_at, n_commands, states,
 ):  # fmt: skip
     """Fill states [E, T, n], (q, q') or (q'), from start [E, n]: the equation of `Machine`, by the leapfrog method.
@@ -52,7 +52,7 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
             for _ in range(substeps):
                 middle = q + 0.5 * h * v
                 x = middle if n > 1 else v
-                t = step * h
+                t = since[experiment] + step * h
                 error = goal[experiment, step] - middle
                 command = goal[experiment, step]
                 if loop:

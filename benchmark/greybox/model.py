@@ -108,28 +108,26 @@ class FittedPlant:
         """The plant without what belongs to single experiments and cannot be forecast."""
         return _forecasting(self.estimate.plant)
 
-    def simulate(
-        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
-    ) -> Float[np.ndarray, "B T-n ny"]:
-        """Simulate rows n .. T-1, from the initial state that suits the n measured samples best."""
-        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
-
     def simulate_whole(
-        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
-    ) -> Float[np.ndarray, "B T ny"]:
-        """Simulate all rows from that initial state, those of the measured samples too."""
-        return Simulator(self.forecasting, u).run(self.estimate.theta, self.start(u, y_init))
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
+        since: Float[np.ndarray, " B"] | None = None,
+    ) -> Float[np.ndarray, "B T ny"]:  # fmt: skip
+        """Simulate all rows, from the initial state that suits the n measured samples best."""
+        return Simulator(self.forecasting, u, since).run(self.estimate.theta, self.start(u, y_init, since))
 
     def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
         """Simulate the training records from the initial states that suit all of each best."""
         plant, estimate = self.forecasting, self.estimate
         theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-        return Simulator(plant, self.records.u).run(theta, local)
+        return Simulator(plant, self.records.u, self.records.since).run(theta, local)
 
-    def start(self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]) -> Float[np.ndarray, "B q"]:
+    def start(
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
+        since: Float[np.ndarray, " B"] | None = None,
+    ) -> Float[np.ndarray, "B q"]:  # fmt: skip
         """Find the initial states: from the first n samples, and from where the training records start."""
         plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
-        beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt), self.noise)
+        beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt, since), self.noise)
         found = initial_states(beginning, theta)
         return self.usual.beside(beginning, theta, found) if self.usual else found
 
@@ -152,13 +150,13 @@ class FittedPlant:
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Simulate rows n_init .. T-1 with what belongs to this experiment alone estimated from all of it."""
         plant, outputs = self.estimate.plant, list(self.outputs)
-        u, y = experiment.u[None], experiment.y[None][:, :, outputs]
-        start = self.start(u, y[:, :n_init])
-        y_hat = Simulator(self.forecasting, u).run(self.estimate.theta, start)[0, n_init:]
+        u, y, since = experiment.u[None], experiment.y[None][:, :, outputs], np.array([experiment.since])
+        start = self.start(u, y[:, :n_init], since)
+        y_hat = Simulator(self.forecasting, u, since).run(self.estimate.theta, start)[0, n_init:]
         if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
             return y_hat  # it grew without bound, which nothing of this experiment can mend
         if plant.per_experiment:
-            y_hat = self._with_own(u, y, start, n_init)
+            y_hat = self._with_own(Records.measured(u, y, experiment.dt, since), start, n_init)
         if self.outliers:
             error = y[0, n_init:] - y_hat
             flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
@@ -166,14 +164,12 @@ class FittedPlant:
                 y_hat[flags[:, j], j] += error[flags[:, j], j]
         return y_hat
 
-    def _with_own(
-        self, u: Float[np.ndarray, "1 T nu"], y: Float[np.ndarray, "1 T ny"], start: np.ndarray, n_init: int
-    ) -> Float[np.ndarray, "N ny"]:
+    def _with_own(self, record: Records, start: np.ndarray, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Simulate with the numbers of this experiment that suit all of it best (Gauss-Newton), from the same start."""
         plant, theta = self.estimate.plant, self.estimate.theta
         _, local = plant.carry(self.forecasting, theta, start)
-        later = np.arange(y.shape[1])[None] >= n_init
-        problem = Problem(plant, replace(Records.measured(u, y, plant.dt), mask=later), white(self.noise.deviations))
+        later = np.arange(record.mask.shape[1])[None] >= n_init
+        problem = Problem(plant, replace(record, mask=later), white(self.noise.deviations))
         own, of_none = slice(plant.n_start, plant.n_local), np.zeros(plant.size, dtype=bool)
         errors = problem.errors(theta, local)
         for _ in range(OWN_STEPS):
@@ -218,19 +214,24 @@ class GreyBoxModel:
     plants: list[FittedPlant] = field(default_factory=list, repr=False)
 
     def simulate(
-        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
-    ) -> Float[np.ndarray, "B T-n ny"]:
-        """Simulate from the state found in the n measured samples; what belongs to one experiment is not forecast."""
-        return self.simulate_whole(u, y_init)[:, y_init.shape[1] :]
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
+        since: Float[np.ndarray, " B"] | None = None,
+    ) -> Float[np.ndarray, "B T-n ny"]:  # fmt: skip
+        """Simulate from the state found in the n measured samples; what belongs to one experiment is not forecast.
+
+        `since`: seconds that the machine had run before the first row, 0 where nothing is said.
+        """
+        return self.simulate_whole(u, y_init, since)[:, y_init.shape[1] :]
 
     def simulate_whole(
-        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
-    ) -> Float[np.ndarray, "B T ny"]:
+        self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
+        since: Float[np.ndarray, " B"] | None = None,
+    ) -> Float[np.ndarray, "B T ny"]:  # fmt: skip
         """Simulate all rows from that state, those of the measured samples too."""
         y_hat = np.empty((*u.shape[:2], y_init.shape[2]))
         for plant in self.plants:
             outputs = list(plant.outputs)
-            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs])
+            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs], since)
         return y_hat
 
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:

@@ -27,6 +27,7 @@ class Records:
     y: Float[np.ndarray, "E T ny"]
     mask: Bool[np.ndarray, "E T"]
     dt: float
+    since: Float[np.ndarray, " E"]  # s that the machine had run before the first sample
     soft: float = 0.0  # errors beyond it count by their size, not by its square; 0: all count by the square
 
     @classmethod
@@ -42,12 +43,17 @@ class Records:
             np.stack([padded(x.y[:, list(outputs)]) for x in experiments]),
             np.stack([np.arange(longest) < len(x) for x in experiments]),
             experiments[0].dt,
+            np.array([x.since for x in experiments]),
         )
 
     @classmethod
-    def measured(cls, u: Float[np.ndarray, "E T nu"], y: Float[np.ndarray, "E T ny"], dt: float) -> Records:
-        """Take records of one length, with every sample measured."""
-        return cls(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), dt)
+    def measured(
+        cls, u: Float[np.ndarray, "E T nu"], y: Float[np.ndarray, "E T ny"], dt: float,
+        since: Float[np.ndarray, " E"] | None = None,
+    ) -> Records:  # fmt: skip
+        """Take records of one length, with every sample measured, that begin where their runs do if nothing is said."""
+        since = np.zeros(len(u)) if since is None else since
+        return cls(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), dt, since)
 
     @cached_property
     def sizes(self) -> Float[np.ndarray, " ny"]:
@@ -66,7 +72,8 @@ class Records:
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
-        return Records(self.u[experiments], self.y[experiments], self.mask[experiments], self.dt, self.soft)
+        of_each = (values[experiments] for values in (self.u, self.y, self.mask))
+        return Records(*of_each, self.dt, self.since[experiments], self.soft)
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""
@@ -82,7 +89,7 @@ class Records:
 
     def _between(self, first: int, last: int) -> Records:
         u, y, mask = (values[:, first:last] for values in (self.u, self.y, self.mask))
-        return Records(np.ascontiguousarray(u), y, mask, self.dt, self.soft)
+        return Records(np.ascontiguousarray(u), y, mask, self.dt, self.since + self.dt * first, self.soft)
 
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""
@@ -92,7 +99,8 @@ class Records:
             whole = values[:, : count * samples]
             return np.ascontiguousarray(whole.reshape(-1, samples, *values.shape[2:]))
 
-        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt, self.soft)
+        since = self.since[:, None] + self.dt * samples * np.arange(count)
+        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt, since.ravel(), self.soft)
 
     @property
     def duration(self) -> float:

@@ -31,8 +31,7 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
     listed = []
     for name in EFFECTS.names():
         effect = EFFECTS[name]()
-        out_of_sight = (effect.own and not baseline.repeated) or (effect.of_time and baseline.cut)
-        if not effect.simulated or name in contained or out_of_sight:
+        if not effect.simulated or name in contained or (effect.own and not baseline.repeated):
             continue
         channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
         on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]

@@ -45,7 +45,8 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             x_max=x_max, v_max=v_max, stroke=_stroke(x, v_max, records) if plant.order == 1 or plant.swings else x_max,
             force_rms=force,
             u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
-            lines=lines(estimate.errors[:, :, 0], records.dt), quantisation_step=quantisation_step(records.y[:, :, j]),
+            lines=lines(estimate.errors[:, :, 0], records.dt, records.since),
+            quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
     poles = np.linalg.eigvals(plant.matrix(estimate.theta)) if plant.order else np.zeros(1)
@@ -60,10 +61,14 @@ def _stroke(v: np.ndarray, v_max: float, records: Records) -> float:
     return v_max * records.dt * float(min(longest, 200)) * 0.5
 
 
-def lines(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:
-    """Find the frequencies in Hz at which the errors of all experiments agree in amplitude and phase."""
-    n = 1 << int(np.ceil(np.log2(4 * e.shape[1])))
-    power = np.abs(np.fft.rfft(e.sum(0), n)) ** 2
+def lines(e: Float[np.ndarray, "E T"], dt: float, since: Float[np.ndarray, " E"]) -> tuple[float, ...]:
+    """Find the frequencies in Hz at which the errors of all experiments agree in amplitude and phase, over the run."""
+    begins = np.round(since / dt).astype(int)
+    together = np.zeros(begins.max() + e.shape[1])  # where several runs were recorded, one on top of the other
+    for begin, of_record in zip(begins, e, strict=True):
+        together[begin : begin + len(of_record)] += of_record
+    n = 1 << int(np.ceil(np.log2(4 * len(together))))
+    power = np.abs(np.fft.rfft(together, n)) ** 2
     frequencies = np.fft.rfftfreq(n, dt)
     power[frequencies < 0.7 / (dt * e.shape[1])] = 0.0
     found: list[float] = []

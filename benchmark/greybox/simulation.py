@@ -86,11 +86,16 @@ def distinct(values: Float[np.ndarray, "S k"]) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Simulator:
-    """One plant on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller."""
+    """One plant on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller.
 
-    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"]) -> None:
+    `since` [E]: seconds that the machine had run before the first sample; 0 where nothing is said.
+    """
+
+    def __init__(
+        self, plant: Plant, u: Float[np.ndarray, "E T nu"], since: Float[np.ndarray, " E"] | None = None
+    ) -> None:
         self.plant = plant
-        self.drive = Drive(plant, u)
+        self.drive = Drive(plant, u, since)
         self.substeps, self.h = self.drive.substeps, self.drive.h
         self.t = plant.dt * np.arange(u.shape[1])  # [T]
         self.shape = u.shape
@@ -146,8 +151,8 @@ class Simulator:
             return states
         run = run_tanks if plant.cascade else run_body
         run(
-            e, g0, g1, rates, seen(plant, thetas), entry, drives, at_start, self.substeps, self.h, self._terms,
-            self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._begun(starts), states,
+            e, g0, g1, rates, seen(plant, thetas), entry, drives, at_start, self.drive.since, self.substeps, self.h,
+            self._terms, self._until, np.ascontiguousarray(thetas), self._p_at, self._m_at, self._begun(starts), states,
         )  # fmt: skip
         return states
 
@@ -174,9 +179,9 @@ class Simulator:
         numbers = np.array([*theta[[DAMPING, BACK_EMF, DERIVATIVE, STIFFNESS]], known.radian, known.hangs_at])
         run_machine(
             machine.controlled, np.ascontiguousarray(goal), gain, supply * theta[plant.layout.gains.start], on,
-            inertias, weights, numbers, np.ascontiguousarray(start[:, : plant.order]), self.substeps, self.h,
-            self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at, self._memory,
-            self._commands, self._c_at, self._n_commands, states,
+            inertias, weights, numbers, np.ascontiguousarray(start[:, : plant.order]), self.drive.since,
+            self.substeps, self.h, self._terms, self._until, np.ascontiguousarray(theta), self._p_at, self._m_at,
+            self._memory, self._commands, self._c_at, self._n_commands, states,
         )  # fmt: skip
         return states
 
@@ -185,8 +190,8 @@ class Simulator:
         states, begun = np.empty((*self.shape[:2], 2)), self._begun(start)
         x, v = self.drive.motion(theta, start)
         follow_motion(
-            self.drive.of(theta, start), x, v, self.h, self._terms, self._until, np.ascontiguousarray(theta),
-            self._p_at, self._m_at, begun, self._memory, states,
+            self.drive.of(theta, start), x, v, self.drive.since, self.h, self._terms, self._until,
+            np.ascontiguousarray(theta), self._p_at, self._m_at, begun, self._memory, states,
         )  # fmt: skip
         if self.plant.by_rate:
             states[:, :, 1] = v

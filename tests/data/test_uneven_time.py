@@ -56,6 +56,14 @@ def test_a_gap_starts_a_new_experiment():
     assert reading.said == ("sampling time 0.1 s from column t", "2 experiments of one file, cut at 1 gap in column t")
 
 
+def test_the_pieces_of_a_log_know_when_they_began():
+    for t in (EVEN, GAP + 7.0):
+        parts = experiments(load(frame(t), ["u"], ["y"], split_gaps=True))
+        assert len(parts) > 2
+        for part in parts:
+            assert part.since == pytest.approx(part.y[0, 0] / 3 - t[0])
+
+
 def test_time_that_starts_again_starts_a_new_experiment():
     data = load(frame(np.concatenate([EVEN, EVEN, EVEN])), ["u"], ["y"], split_gaps=True)
     assert [part.y[0, 0] for part in data.training.train] == [0.0, 0.0]

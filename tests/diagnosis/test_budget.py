@@ -141,7 +141,7 @@ def test_the_json_has_the_budget_of_every_output(named):
 
 def test_a_run_in_which_a_known_machine_stuck_is_named():
     class Follows:
-        def simulate(self, u, y_init):
+        def simulate(self, u, y_init, since):
             return u[:, y_init.shape[1] :]
 
     rng = np.random.default_rng(0)

@@ -36,7 +36,7 @@ def channels(kind, ny=1):
 def records(u, y, dt, measured=None):
     """Records side by side: u [E, T], y [E, T, ny], measured [E, T]."""
     seen = np.ones(u.shape, dtype=bool) if measured is None else measured
-    return Records(np.ascontiguousarray(u[:, :, None]), y, seen, dt)
+    return Records(np.ascontiguousarray(u[:, :, None]), y, seen, dt, np.zeros(len(u)))
 
 
 def term(name):
@@ -197,9 +197,9 @@ def measured_without_outliers(e, measured):
     return outliers.without_outliers(data, e, outliers.find_outliers(e, measured)).mask
 
 
-def lines(e, dt):
-    """Frequencies in Hz that the errors [E, T] of all experiments share."""
-    return signal_scales.lines(e, dt)
+def lines(e, dt, since=0.0):
+    """Frequencies in Hz that the errors [E, T] of all experiments share, which began `since` seconds after the run."""
+    return signal_scales.lines(e, dt, np.broadcast_to(since, len(e)))
 
 
 def lattice(y):

@@ -8,7 +8,9 @@ from simgap.greybox.drive import Drive
 from simgap.greybox.effects.dead_zone import DeadZone
 from simgap.greybox.effects.load_drift import LoadDrift
 from simgap.greybox.plant import Plant
+from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
+from simgap.registry import EFFECTS
 
 
 @pytest.mark.parametrize("effects", [(), (DeadZone(),), (LoadDrift(),)])
@@ -24,6 +26,20 @@ def test_the_drives_of_several_parameter_vectors_are_those_of_each(effects, taps
     starts = rng.standard_normal((4, 3, drive_of.n_moving - drive_of.order))
     alone = np.stack([drive.of(theta, start) for theta, start in zip(thetas, starts, strict=True)])
     np.testing.assert_allclose(drive.of_each(thetas, starts), alone, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("effect", "values"), [("gain_fade", [0.05]), ("periodic_disturbance", [3.0, 0.31, 0.7])])
+def test_a_record_cut_in_two_is_simulated_as_the_whole_one(effect, values):
+    seen = scales("velocity", 1)
+    plant = Plant("velocity", 1, 1, 0.1, offset=False, scales=PlantScales((seen,), (seen,)))
+    plant = plant.having([Term(EFFECTS[effect]())])
+    theta = np.array([1.5, 2.0, *values])  # pole, gain
+    u = np.random.default_rng(0).standard_normal((1, 100, 1))
+    whole = Simulator(plant, u).states(theta[None], np.zeros((1, 1, 1)))[0]
+    later = Simulator(plant, u[:, 60:], np.array([6.0])).states(theta[None], whole[None, :, 60])[0]
+    np.testing.assert_allclose(later, whole[:, 60:], atol=5e-3)  # the first step extrapolates no force
+    anew = Simulator(plant, u[:, 60:]).states(theta[None], whole[None, :, 60])[0]
+    assert np.abs(anew - whole[:, 60:]).max() > 0.1
 
 
 def test_an_input_holds_until_the_next_sample_and_its_neighbours_act_through_their_gains():

@@ -31,6 +31,12 @@ def test_a_line_whose_phase_differs_between_experiments_cancels():
     assert lines(shared + not_shared, DT)[0] == pytest.approx(4.21, abs=0.25 * RESOLUTION)
 
 
+def test_pieces_of_one_run_tell_a_line_as_finely_as_the_whole_run():
+    since = DT * SAMPLES * np.array([0.0, 3.0, 17.0, 31.0])
+    found = lines(errors(1.3712, phases=2 * np.pi * 1.3712 * since), DT, since)
+    assert found[0] == pytest.approx(1.3712, abs=0.25 * RESOLUTION / 32)
+
+
 def test_one_line_is_not_found_twice():
     found = np.array(lines(errors(4.21, phases=(0.0, 0.0)), DT))
     assert np.abs(np.subtract.outer(found, found))[~np.eye(len(found), dtype=bool)].min() >= RESOLUTION

@@ -157,8 +157,6 @@ class Effect(ABC):
     # So many numbers are estimated anew in every experiment: it adds each times one of its `shapes` to the reading, or
     # to the forces.
     own: ClassVar[int] = 0
-    # It depends on the time since the start of the experiment, which pieces of a long record do not know.
-    of_time: ClassVar[bool] = False
     # False when it cannot be simulated and is found in the errors instead.
     simulated: ClassVar[bool] = True
     # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.
@@ -246,6 +244,14 @@ class InputEffect(Effect):
     @staticmethod
     def term_from(u: np.ndarray, p: np.ndarray, h: float, start: np.ndarray) -> np.ndarray:
         """Return the same for records that start with this in memory, 0 in the middle; for terms that have any."""
+        raise NotImplementedError
+
+    # It depends on the time since the machine began to run.
+    of_time: ClassVar[bool] = False
+
+    @staticmethod
+    def term_since(u: np.ndarray, p: np.ndarray, h: float, since: np.ndarray) -> np.ndarray:
+        """Return the term of records that begin so many seconds [E] after that, for what depends on this time."""
         raise NotImplementedError
 
     # For exports, the term for one number after the other, step(u, p, i, m, j, h, k) with k = 0 at the first: its

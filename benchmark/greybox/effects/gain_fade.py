@@ -1,4 +1,4 @@
-"""A gain that falls in the course of an experiment."""
+"""A gain that falls in the course of a run."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from simgap.registry import EFFECTS
 @EFFECTS.register("gain_fade")
 @final
 class GainFade(InputEffect):
-    """u' = max(1 - r t, 0) u, t since the start of the experiment."""
+    """u' = max(1 - r t, 0) u, t since the machine began to run."""
 
     name: ClassVar[str] = "gain_fade"
     title: ClassVar[str] = "a gain that fades with time"
     explanation: ClassVar[str] = (
-        "The same input achieves less and less in the course of each experiment: a battery that runs down, a winding "
+        "The same input achieves less and less in the course of a run: a battery that runs down, a winding "
         "that warms up, a filter that clogs, oil that changes with temperature."
     )
     reference: ClassVar[str] = "Isermann, Fault-Diagnosis Applications, 2011, ch. 3"
@@ -42,7 +42,13 @@ class GainFade(InputEffect):
     @staticmethod
     def term(u: np.ndarray, p: np.ndarray, h: float) -> np.ndarray:
         """Return u max(1 - p[0] t, 0), with t at the middle of each step."""
-        return u * np.maximum(1 - p[0] * h * (np.arange(u.shape[1]) + 0.5), 0.0)
+        return GainFade.term_since(u, p, h, np.zeros(len(u)))
+
+    @staticmethod
+    def term_since(u: np.ndarray, p: np.ndarray, h: float, since: np.ndarray) -> np.ndarray:
+        """Return the same for records that begin later."""
+        t = since[:, None] + h * (np.arange(u.shape[1]) + 0.5)  # [E, K]
+        return u * np.maximum(1 - p[0] * t, 0.0)
 
     @staticmethod
     def step(u, p, i, m, j, h, k):

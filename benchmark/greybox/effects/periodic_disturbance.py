@@ -13,7 +13,7 @@ from simgap.registry import EFFECTS
 @EFFECTS.register("periodic_disturbance")
 @final
 class PeriodicDisturbance(ForceEffect):
-    """f = A sin(2 pi f t + phase), t since the start of the experiment."""
+    """f = A sin(2 pi f t + phase), t since the machine began to run."""
 
     name: ClassVar[str] = "periodic_disturbance"
     title: ClassVar[str] = "a periodic disturbance"
@@ -25,7 +25,6 @@ class PeriodicDisturbance(ForceEffect):
         "Bodson and Douglas, Adaptive algorithms for the rejection of sinusoidal disturbances, Automatica 33, 1997"
     )
     role: ClassVar[Role] = "force"
-    of_time: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("frequency band", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "position_torque": (
@@ -38,10 +37,10 @@ class PeriodicDisturbance(ForceEffect):
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the amplitude, the frequency, and the phase at the start of an experiment."""
+        """Return the amplitude, the frequency, and the phase at the start of a run."""
         return (
             Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
-            Parameter("frequency", "Hz", 0.2 / scales.duration, 0.5 / scales.dt),
+            Parameter("frequency", "Hz", 1 / scales.duration, 0.5 / scales.dt),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
