@@ -23,13 +23,13 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
         sentences.append("There are no validation data: effects were accepted on the training data alone.")
     if len(training.train) == 1:
         sentences.append(
-            "There is one training experiment: a drift of the sensor cannot be told from a slow change of the plant."
+            "There is one training experiment: a drift of the sensor or of the load shows only where it goes on evenly."
         )
     looked_at = excerpts if dataset.channels.plant is None else spread
     if is_cut(looked_at(training.train), training.train):
         sentences.append(
-            f"There are many training samples, so causes are looked for in pieces of {PIECE}: what changes from one "
-            "experiment to the next, such as a drift of the sensor, cannot show."
+            f"There are many training samples, so causes are looked for in pieces of {PIECE}: a drift shows "
+            "only where it goes on evenly."
         )
     for i, channel in enumerate(dataset.channels.outputs):
         y = np.concatenate([x.y[:, i] for x in training.train])

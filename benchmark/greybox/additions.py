@@ -231,7 +231,9 @@ def _from_pieces(baseline: Baseline, estimate: Estimate, plant: Plant, term: Ter
 def _from_other_poles(baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, max_steps: int) -> Estimate:
     """Fit an effect without which the linear plant has other poles: they are searched for anew."""
     thetas = [theta for theta, _ in started(estimate, plant, term)]
-    fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE)
+    known = {start.amplitude for start in plant.starts_of(term)} - {None}
+    amplitudes = [plant.part_of(term).start + number for number in known]
+    fit = refit_from_poles(baseline.problem(plant), thetas, max_steps, TOLERANCE, amplitudes)
     if term.effect.hides_sign and plant.ny == 1 and not plant.joint:
         plain = unfolded(baseline.plant, baseline.train)
         theta, local = plant.carry(plain.plant, plain.theta, plain.local)

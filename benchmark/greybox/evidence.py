@@ -125,7 +125,9 @@ class Evidence:
         if effect.visible_in_readings:  # and confirmed by plain squares
             ratio = -0.5 * baseline.train.samples * math.log(chosen.estimate.squares / without.estimate.squares)
         values = self._values(term)
-        rivals = [rival for rival in self._rivals(term, without) if rival.behind < CONFOUNDED]
+        near = [rival for rival in self._rivals(term, without) if rival.behind < CONFOUNDED]
+        # A law that contains another one that does as well says no more than that.
+        rivals = [one for one in near if not any(other.effect.name in one.effect.contains for other in near)]
         confounded = tuple(separation(effect, rival.effect, baseline.plant.kind) for rival in rivals)
         return Cause(
             effect.name, effect.title, effect.describe({value.name: value.value for value in values}),

@@ -10,7 +10,9 @@ from typing import Literal
 import numpy as np
 
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.effects.load_drift import SteadyLoadDrift
 from simgap.greybox.effects.periodic_disturbance import PeriodicDisturbance
+from simgap.greybox.effects.sensor_drift import SteadySensorDrift
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, with_plain
@@ -47,8 +49,8 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
     what the linear model leaves of records that neither was fitted to: no order has such a stand-in. A lag or a delay
     is a linear model itself, of few parameters, and is believed as long as more of them hardly help, be it beside what
     the lag takes of the error or beside what it leaves. None too where effects are of single experiments and cannot be
-    forecast, and where the linear model holds a periodic disturbance as a swing of its own. The orders of an output
-    that is no motion and no level have been tried already; see `_of_tried_order`.
+    forecast, and where the linear model holds a drift or a periodic disturbance as a motion of its own. The orders of
+    an output that is no motion and no level have been tried already; see `_of_tried_order`.
     """
     plain, chosen = selection.baseline, selection.trial.estimate
     output, *others = plain.outputs
@@ -58,7 +60,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         return _of_tried_order(selection, channels)
     whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
     linear = find_baseline(*whole, every_reading=not plain.outliers)
-    if swings_as_the_disturbance(linear.estimate, chosen, plain.train.duration):
+    if moves_by_itself_as(linear.estimate, chosen, plain.train.duration):
         return None
     if _linear_or_visible(chosen):
         with_effects, without, of_linear = map(plain.held_out_errors, (chosen, plain.estimate, linear.estimate))
@@ -105,15 +107,21 @@ def _beaten(plain: Baseline, chosen: Estimate, gain: np.ndarray, linear: Baselin
     return better or halves_speak_for(plain, chosen, fit)
 
 
-def swings_as_the_disturbance(linear: Estimate, chosen: Estimate, duration: float) -> bool:
-    """Tell whether a linear model has poles, undamped as far as records show, at the frequency of a disturbance.
+def moves_by_itself_as(linear: Estimate, chosen: Estimate, duration: float) -> bool:
+    """Tell whether a linear model has more poles, undamped as far as records show, at the frequency of a disturbance.
 
-    Where every record begins at the same phase, they swing on from the usual start as the disturbance does.
+    From their start they swing on as the disturbance does where every record begins at the same phase, or drift on.
     """
-    poles = np.linalg.eigvals(linear.plant.matrix(linear.theta))
-    disturbances = [term for term in chosen.plant.terms if isinstance(term.effect, PeriodicDisturbance)]
-    frequencies = [chosen.theta[chosen.plant.part_of(term)][1] for term in disturbances]
-    return any(np.any(np.abs(poles - 2j * math.pi * f) < 2 * math.pi / duration) for f in frequencies)
+    of_linear, of_chosen = (np.linalg.eigvals(fit.plant.matrix(fit.theta)) for fit in (linear, chosen))
+
+    def more_near(f: float) -> bool:
+        near = [np.sum(np.abs(poles - 2j * math.pi * f) < 2 * math.pi / duration) for poles in (of_linear, of_chosen)]
+        return bool(near[0] > near[1])
+
+    periodic = [term for term in chosen.plant.terms if isinstance(term.effect, PeriodicDisturbance)]
+    frequencies = [chosen.theta[chosen.plant.part_of(term)][1] for term in periodic]
+    drifts = any(isinstance(term.effect, SteadySensorDrift | SteadyLoadDrift) for term in chosen.plant.terms)
+    return any(map(more_near, frequencies)) or (drifts and more_near(0.0))
 
 
 def _of_tried_order(selection: Selection, channels: Channels) -> LinearRival | None:

@@ -96,11 +96,13 @@ def _zeros_at_new_poles(plant: Plant, theta: np.ndarray, smaller: Estimate) -> n
     return np.pad(zeros[1:], (0, plant.zeros + 1 - len(zeros)))
 
 
-def refit_from_poles(problem: Problem, starts: list[np.ndarray], max_steps: int, tolerance: float) -> Estimate:
-    """Fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept."""
+def refit_from_poles(
+    problem: Problem, starts: list[np.ndarray], max_steps: int, tolerance: float, amplitudes: Sequence[int] = ()
+) -> Estimate:
+    """Fit from a coarse grid of poles; each of `starts` is a theta whose terms are kept but for these amplitudes."""
     plant, records = problem.plant, problem.records
     gains = np.zeros(plant.size, dtype=bool)
-    gains[plant.layout.gains] = gains[plant.layout.offset] = True
+    gains[plant.layout.gains] = gains[plant.layout.offset] = gains[list(amplitudes)] = True
     begun = []
     poles = starts[0][plant.layout.poles]
     if plant.machine:

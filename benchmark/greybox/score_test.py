@@ -10,6 +10,7 @@ import numpy as np
 
 from simgap.cores import on_cores
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.effects.effect import Effect
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.kernels import SLOTS
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian, NormalEquations
@@ -30,8 +31,12 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
     contained = {name for term in terms for name in term.effect.contains}
     listed = []
     for name in EFFECTS.names():
-        effect = EFFECTS[name]()
-        if not effect.simulated or name in contained or (effect.own and not baseline.repeated):
+        effect: Effect = EFFECTS[name]()
+        if effect.own and not baseline.repeated:
+            if effect.steady is None:
+                continue
+            effect = effect.steady()
+        if not effect.simulated or name in contained:
             continue
         channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
         on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]

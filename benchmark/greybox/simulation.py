@@ -255,4 +255,4 @@ class Simulator:
         assert isinstance(term.effect, OutputEffect)
         if term in self.plant.remembered:
             return term.effect.term_from(y, p, self.t, local[:, self.plant.start_of(term)])
-        return term.effect.term(y, p, self.t)
+        return term.effect.term(y, p, self.drive.since[:, None] + self.t if term.effect.of_time else self.t)

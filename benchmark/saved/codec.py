@@ -55,10 +55,9 @@ class Encoder:
         if kind in parts:
             return {"part": kind.__name__, "state": self._state(state_of(value), parts, at)}
         name = getattr(kind, "name", "")
-        if isinstance(name, str) and name in EFFECTS and EFFECTS[name] is kind:
-            return {"effect": name}
-        if isinstance(name, str) and name in EFFECTS and EFFECTS[name].refined is kind:
-            return {"refined": name}
+        laws = EFFECTS[name].laws() if isinstance(name, str) and name in EFFECTS else {}
+        if kind in laws.values():
+            return {next(what for what, law in laws.items() if law is kind): name}
         if callable(getattr(kind, "simulate", None)):
             return self.model(value, at)
         raise _refused(at, f"a {kind.__qualname__}")
@@ -111,10 +110,9 @@ def _decoded(text: Any, arrays: dict[str, np.ndarray], parts: dict[str, type]) -
             value = tuple(each(values))
         case {"keys": keys, "values": values}:
             value = dict(zip(each(keys), each(values), strict=True))
-        case {"effect": name}:
-            value = EFFECTS[str(name)]()
-        case {"refined": name}:
-            value = EFFECTS[str(name)].refined()
+        case {"effect": name} | {"refined": name} | {"steady": name}:
+            (what,) = text
+            value = EFFECTS[str(name)].laws()[what]()
         case {"part": name, "state": state}:
             value = build_record(parts[name], dict(zip(state, each(list(state.values())), strict=True)))
         case _:

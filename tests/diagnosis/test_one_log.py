@@ -9,18 +9,21 @@ import simgap
 DT, SUBSTEPS = 0.02, 10
 
 
-def log(samples, fade=0.0, hum=0.0, hertz=1.37):
-    """Record voltage and speed; the gain falls by a share `fade` over the log, `hum` in rad/s^2 shakes the motor."""
+def log(samples, fade=0.0, hum=0.0, hertz=1.37, reading=0.0, load=0.0):
+    """Record voltage and speed; the gain falls by a share `fade` over the log, `hum` in rad/s^2 shakes the motor.
+
+    The reading is off by `reading` rad/s at its end, a brake takes `load` in rad/s^2 by then.
+    """
     rng = np.random.default_rng(5)
     voltage = np.repeat(rng.uniform(-5.0, 5.0, samples // 40 + 1), 40)[:samples]
     t = DT / SUBSTEPS * np.arange(samples * SUBSTEPS)
     pushed = 8.0 * (1 - fade * t / (samples * DT)) * np.repeat(voltage, SUBSTEPS)
-    pushed += hum * np.sin(2 * np.pi * hertz * t + 0.4)
+    pushed += hum * np.sin(2 * np.pi * hertz * t + 0.4) - load * t / t[-1]
     speed = np.zeros(samples * SUBSTEPS)
     for k in range(1, len(speed)):
         speed[k] = speed[k - 1] + DT / SUBSTEPS * (pushed[k - 1] - speed[k - 1] / 0.4)
     speed = speed[::SUBSTEPS]
-    speed += 0.02 * np.std(speed) * rng.standard_normal(samples)
+    speed += 0.02 * np.std(speed) * rng.standard_normal(samples) + np.linspace(0.0, reading, samples)
     table = pd.DataFrame({"t": DT * np.arange(samples), "voltage [V]": voltage, "speed [rad/s]": speed})
     return simgap.load(table, inputs=["voltage"], outputs=["speed"])
 
@@ -43,6 +46,20 @@ def test_hum_keeps_its_phase_through_one_log(samples):
     amplitude, frequency, _ = (p.value for p in cause.parameters)
     assert abs(amplitude) == pytest.approx(8.0, rel=0.05)
     assert frequency == pytest.approx(1.37, abs=1e-3)
+
+
+@pytest.mark.parametrize("samples", [4000, pytest.param(25_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("drift", [{"reading": 5.0}, {"load": 12.0}])
+def test_a_drift_that_goes_on_evenly_is_named_and_whether_of_sensor_or_load_is_left_open(drift, samples):
+    found = simgap.diagnose(log(samples, **drift), views_too=False)
+    (cause,) = found.causes
+    assert found.verdict == "named"
+    slope = cause.parameters[0].value * samples * DT
+    assert {cause.effect, *(other.effect for other in cause.confounded_with)} == {"sensor_drift", "load_drift"}
+    if cause.effect == "sensor_drift":
+        assert slope == pytest.approx(drift.get("reading", -0.4 * drift.get("load", 0.0)), rel=0.05)
+    else:
+        assert slope == pytest.approx(drift.get("reading", 0.0) / 0.4 - drift.get("load", 0.0), rel=0.05)
 
 
 def test_of_a_motor_that_does_not_change_nothing_is_said():

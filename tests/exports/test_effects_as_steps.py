@@ -13,8 +13,7 @@ SUBSTEP = 0.025
 
 
 def effects_of(base):
-    every = [EFFECTS[name]() for name in EFFECTS]
-    every += [effect.refined() for effect in every if effect.refined]
+    every = [law() for name in EFFECTS for law in EFFECTS[name].laws().values()]
     return [e for e in every if isinstance(e, base) and e.simulated and not e.own]
 
 

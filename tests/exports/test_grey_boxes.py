@@ -37,21 +37,24 @@ def test_a_plant_without_effects_runs_as_ours(name):
     assert differs(grey_box(name), *record(name)) < 1e-12
 
 
+LAWS = {name: EFFECTS[name] for name in EFFECTS}
+LAWS |= {f"steady {name}": effect.steady for name, effect in LAWS.items() if effect.steady}
+
+
 def plants_for(effect):
     """The plants on which an effect makes sense."""
-    on_all = [name for name, (kind, order, *_) in PLANTS.items() if EFFECTS[effect]().applies_to(scales(kind, order))]
-    return [name for name in on_all if name != "imposed" or EFFECTS[effect].role not in ("stop", "rim", "outflow")]
+    on_all = [name for name, (kind, order, *_) in PLANTS.items() if LAWS[effect]().applies_to(scales(kind, order))]
+    return [name for name in on_all if name != "imposed" or LAWS[effect].role not in ("stop", "rim", "outflow")]
 
 
 # One that acts on the command of a controller inside has no plant here: such machines are not exported.
-FORECAST = [name for name in EFFECTS if EFFECTS[name].simulated and not EFFECTS[name].own and plants_for(name)]
+FORECAST = [name for name, law in LAWS.items() if law.simulated and not law.own and plants_for(name)]
 
 
 def check_on(plant, effect):
     kind, order, *_ = PLANTS[plant]
-    models = [
-        grey_box(plant, [EFFECTS[effect]()], [values]) for values in values_of(EFFECTS[effect](), scales(kind, order))
-    ]
+    law = LAWS[effect]()
+    models = [grey_box(plant, [law], [values]) for values in values_of(law, scales(kind, order))]
     u, y_init = record(plant)
     bounded = [model for model in models if np.abs(model.simulate(u[None], y_init[None])).max() < 1e6]
     assert bounded

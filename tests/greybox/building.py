@@ -43,6 +43,11 @@ def candidates(search, *present):
     return [t.effect.name for t in _candidates(search, [term(name) for name in present])]
 
 
+def of_single_experiments(search):
+    """Names of those with numbers of their own in each experiment."""
+    return {t.effect.name for t in _candidates(search, []) if t.effect.per_experiment}
+
+
 def cut_in_pieces(search):
     """The same search on records that are only pieces of experiments."""
     return replace(search, cut=True)

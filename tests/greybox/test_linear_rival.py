@@ -8,7 +8,7 @@ from simgap.data.simulated import field, rigs
 from simgap.diagnosis.diagnose import diagnose
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.identification import identify
-from simgap.greybox.linear_rival import swings_as_the_disturbance
+from simgap.greybox.linear_rival import moves_by_itself_as
 from simgap.records import TrainingSet
 
 from .parts import channels, experiments, model, term
@@ -92,7 +92,7 @@ def test_a_disturbance_is_held_by_undamped_poles_at_its_frequency_and_a_model_ma
     theta = np.zeros(plant.size)
     theta[plant.part_of(plant.terms[0])] = 1.0, 1.0, 0.0  # of 1 Hz
     linear = model("other", 0.01, poles, 1.0)
-    assert swings_as_the_disturbance(_ended_at(*linear), _ended_at(plant, theta), duration=20.0) is swings
+    assert moves_by_itself_as(_ended_at(*linear), _ended_at(plant, theta), duration=20.0) is swings
 
 
 def _ended_at(plant, theta):

@@ -45,7 +45,7 @@ class ConstantLoad(ForceEffect):
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the plain model lacks an operating point that is fitted."""
-        return scales.kind in ("position", "velocity")
+        return scales.at_zero
 
     @staticmethod
     def term(x, v, t, h, p, i, m, j):

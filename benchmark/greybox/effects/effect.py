@@ -45,6 +45,11 @@ class SignalScales:
     quantisation_step: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
 
     @property
+    def at_zero(self) -> bool:
+        """Whether the plain model lacks an operating point that is fitted, and stands at zero without input."""
+        return self.kind in ("position", "velocity")
+
+    @property
     def u_max(self) -> float:
         """Largest absolute value of the input."""
         return max(abs(self.u_low), abs(self.u_high))
@@ -157,6 +162,10 @@ class Effect(ABC):
     # So many numbers are estimated anew in every experiment: it adds each times one of its `shapes` to the reading, or
     # to the forces.
     own: ClassVar[int] = 0
+    # The same cause with the same numbers in all experiments: the law where there are too few of them to fit its own.
+    steady: ClassVar[type[Effect] | None] = None
+    # It depends on the time since the machine began to run.
+    of_time: ClassVar[bool] = False
     # False when it cannot be simulated and is found in the errors instead.
     simulated: ClassVar[bool] = True
     # A linear model of higher order would absorb it, so that it is tried before the nonlinear effects.
@@ -187,6 +196,12 @@ class Effect(ABC):
 
     def __hash__(self) -> int:
         return hash(type(self))
+
+    @classmethod
+    def laws(cls) -> dict[str, type[Effect]]:
+        """Return all laws of this cause, by what they are to it."""
+        other = {"refined": cls.refined, "steady": cls.steady}
+        return {"effect": cls} | {what: law for what, law in other.items() if law}
 
     @abstractmethod
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
@@ -246,9 +261,6 @@ class InputEffect(Effect):
         """Return the same for records that start with this in memory, 0 in the middle; for terms that have any."""
         raise NotImplementedError
 
-    # It depends on the time since the machine began to run.
-    of_time: ClassVar[bool] = False
-
     @staticmethod
     def term_since(u: np.ndarray, p: np.ndarray, h: float, since: np.ndarray) -> np.ndarray:
         """Return the term of records that begin so many seconds [E] after that, for what depends on this time."""
@@ -283,7 +295,10 @@ class OutputEffect(Effect):
     @staticmethod
     @abstractmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return the reading of y [E, T] at the times t [T] in s; the record starts at rest."""
+        """Return the reading of y [E, T] at the times t [T] in s; the record starts at rest.
+
+        For what depends on the time since the machine began to run, t is that, [E, T].
+        """
 
     @staticmethod
     def term_from(y: np.ndarray, p: np.ndarray, t: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, final
 
 import numpy as np
@@ -11,6 +12,44 @@ from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
 from simgap.greybox.effects.wandering_load import WanderingLoad
 from simgap.registry import EFFECTS
+
+LARGEST = 1e3  # times the force of the input, which a plain model that the drift leads astray shows too small
+
+
+@final
+class SteadyLoadDrift(ForceEffect):
+    """f = r t + f0, t since the machine began to run; f0 is zero where the plant has an operating point."""
+
+    name: ClassVar[str] = WanderingLoad.name
+    title: ClassVar[str] = WanderingLoad.title
+    explanation: ClassVar[str] = WanderingLoad.explanation
+    reference: ClassVar[str] = WanderingLoad.reference
+    substeps: ClassVar[int] = 1
+    contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"constant_load": (1,)}
+    instead_of_order: ClassVar[bool] = True
+    moves_poles: ClassVar[bool] = True
+    shows_in: ClassVar[tuple[ViewName, ...]] = WanderingLoad.shows_in
+    confounders: ClassVar[dict[str, str]] = WanderingLoad.confounders
+
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
+        """Return the rise of the load, and what it was when the machine began to run."""
+        unit, name, most = scales.force_unit, "load at the start", LARGEST * scales.force_rms
+        first = Parameter(name, unit, -most, most) if scales.at_zero else Parameter.absent(name)
+        most /= scales.duration
+        return Parameter("slope", unit + "/s" if unit else "1/s", -most, most), first
+
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from a slow rise; its amplitude, and so its sign, is then estimated."""
+        return [Start((0.1 * scales.force_rms / scales.duration, 0.0), amplitude=0)]
+
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
+        return scales.order > 0
+
+    @staticmethod
+    def term(x, v, t, h, p, i, m, j):
+        """Return r t + f0."""
+        return p[i] * t + p[i + 1]
 
 
 @EFFECTS.register("load_drift")
@@ -29,6 +68,7 @@ class LoadDrift(ForceEffect):
     own: ClassVar[int] = 1
     substeps: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
+    steady: ClassVar[type[Effect] | None] = SteadyLoadDrift
     refined: ClassVar[type[Effect] | None] = WanderingLoad
     shows_in: ClassVar[tuple[ViewName, ...]] = WanderingLoad.shows_in
     confounders: ClassVar[dict[str, str]] = WanderingLoad.confounders

@@ -7,29 +7,29 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, SignalScales, Start
 from simgap.registry import EFFECTS
 
 
-@EFFECTS.register("sensor_bias")
 @final
-class SensorBias(OutputEffect):
-    """reading = y + b, with another b in every experiment."""
+class SteadySensorBias(OutputEffect):
+    """reading = y + b."""
 
     name: ClassVar[str] = "sensor_bias"
     title: ClassVar[str] = "sensor bias"
     explanation: ClassVar[str] = (
-        "The reading is off by a constant that differs from experiment to experiment: a zero that was not set, an "
+        "The reading is off by a constant, which may differ from experiment to experiment: a zero that was not set, an "
         "encoder that counts from wherever it was switched on."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
-    own: ClassVar[int] = 1
+    linear: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
+    # As without a load: what holds it at the wrong reading would drive it away.
+    may_move_poles_of: ClassVar[tuple[str, ...]] = ("position",)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
     }
-    per_experiment: ClassVar[bool] = True
-    of_one_mass: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the bias."""
@@ -38,6 +38,45 @@ class SensorBias(OutputEffect):
     def starts(self, scales: SignalScales) -> list[Start]:
         """Start from a small bias; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms,), amplitude=0)]
+
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the plain model lacks an operating point that is fitted."""
+        return scales.at_zero
+
+    @staticmethod
+    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return y + p[0]."""
+        return y + p[0]
+
+    @staticmethod
+    def step(y, p, i, m, j, h, k):
+        """Return the same, sample by sample."""
+        return y + p[i]
+
+
+@EFFECTS.register("sensor_bias")
+@final
+class SensorBias(OutputEffect):
+    """reading = y + b, with another b in every experiment."""
+
+    name: ClassVar[str] = SteadySensorBias.name
+    title: ClassVar[str] = SteadySensorBias.title
+    explanation: ClassVar[str] = SteadySensorBias.explanation
+    reference: ClassVar[str] = SteadySensorBias.reference
+    own: ClassVar[int] = 1
+    per_experiment: ClassVar[bool] = True
+    of_one_mass: ClassVar[bool] = True
+    steady: ClassVar[type[Effect] | None] = SteadySensorBias
+    shows_in: ClassVar[tuple[ViewName, ...]] = SteadySensorBias.shows_in
+    confounders: ClassVar[dict[str, str]] = SteadySensorBias.confounders
+
+    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
+        """Return the bias."""
+        return SteadySensorBias().parameters(scales)
+
+    def starts(self, scales: SignalScales) -> list[Start]:
+        """Start from a small bias; its amplitude, and so its sign, is then estimated."""
+        return SteadySensorBias().starts(scales)
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the reading has a zero of its own; that of any other quantity is its operating point."""
@@ -51,4 +90,4 @@ class SensorBias(OutputEffect):
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return y + p[0]."""
-        return y + p[0]
+        return SteadySensorBias.term(y, p, t)
