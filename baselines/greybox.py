@@ -35,6 +35,7 @@ class GreyBox(GreyBoxModel):
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Fit the plain model, then add the effects one by one in the given order; nothing here is random."""
+        data = data.as_runs()  # a simulation is given inputs and first outputs, and not the time
         chosen: list[tuple[Estimate, Baseline]] = []
         named = [self.effects] if isinstance(self.effects, str) else self.effects
         placed = [_place(name, data) for name in named]

@@ -16,13 +16,15 @@ from simgap.registry import MODELS
 class GreyBoxAuto(GreyBox):
     """The grey box with those effects of the catalogue that training and validation data ask for.
 
-    What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other.
+    What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other. It knows
+    no time but that since the start of each record.
     """
 
     effects: Sequence[str] = field(default=(), init=False, repr=False)
 
     def fit(self, data: TrainingSet, seed: int) -> None:
         """Select effects on excerpts of the training data, then fit them to all of it; nothing here is random."""
+        data = data.as_runs()  # a simulation is given inputs and first outputs, and not the time
         found = identify(data)
         self.plants = [identified.plant for identified in found]
         self._chosen = tuple(identified.chosen for identified in found)

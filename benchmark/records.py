@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -148,6 +148,11 @@ class TrainingSet:
     def dt(self) -> float:
         """Sampling time in seconds."""
         return self.train[0].dt
+
+    def as_runs(self) -> TrainingSet:
+        """Return the same records as if each were a run of its own, for models that are not told the time."""
+        train, valid = (tuple(replace(x, since=0.0) for x in records) for records in (self.train, self.valid))
+        return replace(self, train=train, valid=valid)
 
 
 @dataclass(frozen=True, eq=False)
