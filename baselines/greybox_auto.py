@@ -16,8 +16,8 @@ from simgap.registry import MODELS
 class GreyBoxAuto(GreyBox):
     """The grey box with those effects of the catalogue that training and validation data ask for.
 
-    What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other. It knows
-    no time but that since the start of each record.
+    What `simgap diagnose` does, as a model: score test, refits, held-out likelihood, one effect after the other. It
+    knows no time but that since the start of each record.
     """
 
     effects: Sequence[str] = field(default=(), init=False, repr=False)
