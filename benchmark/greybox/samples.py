@@ -72,8 +72,8 @@ class Records:
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
-        of_each = (values[experiments] for values in (self.u, self.y, self.mask))
-        return Records(*of_each, self.dt, self.since[experiments], self.soft)
+        u, y, mask, since = (values[experiments] for values in (self.u, self.y, self.mask, self.since))
+        return Records(u, y, mask, self.dt, since, self.soft)
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""

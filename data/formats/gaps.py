@@ -38,7 +38,7 @@ def pieces_of(
         step = dt or _common_step(clock, parts)
         for part in parts:
             check_even(_part(clock, part), step)
-        made = [(u[part], y[part], clock.seconds[part.start]) for part in parts]
+        made = [(u[part], y[part]) for part in parts]
     else:
         step, made, interpolated = resample, [], 0
         coarse = resample >= COARSER * usual
@@ -49,18 +49,26 @@ def pieces_of(
             grid, new = even_grid(t.seconds, resample)
             interpolated += new
             width = resample if coarse else 0.0
-            on_grid = [_on_grid(grid, t.seconds, values[part], width) for values in (u, y)]
-            made.append((*on_grid, grid[0]))
+            made.append((_on_grid(grid, t.seconds, u[part], width), _on_grid(grid, t.seconds, y[part], width)))
         rows = sum(part.stop - part.start for part in parts)
-        samples = sum(len(values) for values, *_ in made)
+        samples = sum(len(values) for values, _ in made)
         how = f"each the mean over {resample:g} s" if coarse else f"{interpolated} interpolated"
         said = [*said, f"{rows} rows resampled to {samples} samples every {resample:g} s, {how}"]
     names = ["record"] if len(made) == 1 else [f"piece_{k}" for k in range(1, len(made) + 1)]
-    records = [
-        Experiment(name, *signals, step, begin - clock.seconds[0])
-        for name, (*signals, begin) in zip(names, made, strict=True)
-    ]
-    return tuple(records), tuple(said)
+    since = _since(clock, parts)
+    return tuple(Experiment(name, *uy, step, s) for name, uy, s in zip(names, made, since, strict=True)), tuple(said)
+
+
+def _since(clock: Clock, parts: Sequence[slice]) -> list[float]:
+    """Return for how long the machine had run when each part began; where time starts again, it began to run anew."""
+    t, since, began = clock.seconds, [], float(clock.seconds[0])
+    last = began
+    for part in parts:
+        first = float(t[part.start])
+        began = first if first < last else began
+        since.append(first - began)
+        last = float(t[part.stop - 1])
+    return since
 
 
 def even_grid(t: Float[np.ndarray, " T"], dt: float) -> tuple[Float[np.ndarray, " N"], int]:

@@ -68,6 +68,7 @@ def test_time_that_starts_again_starts_a_new_experiment():
     data = load(frame(np.concatenate([EVEN, EVEN, EVEN])), ["u"], ["y"], split_gaps=True)
     assert [part.y[0, 0] for part in data.training.train] == [0.0, 0.0]
     assert [len(part) for part in experiments(data)] == [200, 160, 40, 80, 120]
+    assert [part.since for part in experiments(data)] == pytest.approx([0.0, 0.0, 16.0, 0.0, 8.0])
 
 
 def test_short_pieces_are_left_out_and_that_is_said():
