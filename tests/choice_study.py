@@ -39,7 +39,7 @@ def scores(data: Dataset, found: Identified) -> str:
     """Simulate the test runs freely and tell the errors, and the effects."""
     errors, read = [], []
     for x in data.test:
-        y = found.plant.simulate(x.u[None], x.y[None, : data.n_init])[0, :, 0]
+        y = found.plant.simulate_whole(x.u[None], x.y[None, : data.n_init])[0, data.n_init :, 0]
         measured = x.y[data.n_init :, 0]
         errors.append(measured - y)
         read.append(np.abs(measured - GLITCH) > NEAR)

@@ -97,8 +97,8 @@ def with_backlash(stiffness):
     y_hat = model.simulate(u[None], np.zeros((1, 6, 1)))[0]
     x = Experiment("run", u, np.concatenate([np.zeros((6, 1)), y_hat]), DT)
     data = assemble("rig", ((x,), (x,), (x,)), channels, 6, "rig")
-    plain = grey_box("position").plants[0]
-    plain.estimate.theta[1] = stiffness
+    plain = grey_box("position")
+    plain.plants[0].estimate.theta[1] = stiffness
     without = plain.simulate(u[None], x.y[None, :6])[0]
     return SavedModel("greybox", model, FittedOn.of(data)), data, np.std(without - y_hat) / np.std(y_hat)
 

@@ -149,7 +149,7 @@ def fitted(made, data, weighing, fixed=None):
 
 def own_numbers_of_each(made, data, weighing):
     """The own numbers of each record, found by a fit of that record alone in which theta is fixed."""
-    alone = [Records(data.u[i : i + 1], data.y[i : i + 1], data.mask[i : i + 1], data.dt) for i in range(len(data.u))]
+    alone = [data.only(np.array([i])) for i in range(len(data.u))]
     fixed = np.ones(len(made.theta), dtype=bool)
     return np.concatenate(
         [descend(Problem(made.plant, one, weighing), made.theta, fixed=fixed, max_steps=15).local for one in alone]

@@ -8,28 +8,20 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
-from simgap.greybox.effects.wandering_load import WanderingLoad
+from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
+from simgap.greybox.effects.wandering_load import DriftingLoad, WanderingLoad
 from simgap.registry import EFFECTS
 
 LARGEST = 1e3  # times the force of the input, which a plain model that the drift leads astray shows too small
 
 
 @final
-class SteadyLoadDrift(ForceEffect):
+class SteadyLoadDrift(DriftingLoad):
     """f = r t + f0, t since the machine began to run; f0 is zero where the plant has an operating point."""
 
-    name: ClassVar[str] = WanderingLoad.name
-    title: ClassVar[str] = WanderingLoad.title
-    explanation: ClassVar[str] = WanderingLoad.explanation
-    reference: ClassVar[str] = WanderingLoad.reference
-    substeps: ClassVar[int] = 1
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"constant_load": (1,)}
     instead_of_order: ClassVar[bool] = True
     moves_poles: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[ViewName, ...]] = WanderingLoad.shows_in
-    confounders: ClassVar[dict[str, str]] = WanderingLoad.confounders
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the rise of the load, and what it was when the machine began to run."""
@@ -42,10 +34,6 @@ class SteadyLoadDrift(ForceEffect):
         """Start from a slow rise; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.force_rms / scales.duration, 0.0), amplitude=0)]
 
-    def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
-        return scales.order > 0
-
     @staticmethod
     def term(x, v, t, h, p, i, m, j):
         """Return r t + f0."""
@@ -54,36 +42,17 @@ class SteadyLoadDrift(ForceEffect):
 
 @EFFECTS.register("load_drift")
 @final
-class LoadDrift(ForceEffect):
+class LoadDrift(DriftingLoad):
     """f = r sqrt(3) t / T, with another r in every experiment of T s; r is the rms of the load.
 
     It has as many numbers as a drift of the sensor, from which the records must tell it. A load that comes and goes is
     tried after it.
     """
 
-    name: ClassVar[str] = WanderingLoad.name
-    title: ClassVar[str] = WanderingLoad.title
-    explanation: ClassVar[str] = WanderingLoad.explanation
-    reference: ClassVar[str] = WanderingLoad.reference
     own: ClassVar[int] = 1
-    substeps: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
     steady: ClassVar[type[Effect] | None] = SteadyLoadDrift
     refined: ClassVar[type[Effect] | None] = WanderingLoad
-    shows_in: ClassVar[tuple[ViewName, ...]] = WanderingLoad.shows_in
-    confounders: ClassVar[dict[str, str]] = WanderingLoad.confounders
-
-    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the size of the load."""
-        return WanderingLoad().parameters(scales)
-
-    def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from a small load; its size in each experiment is then estimated."""
-        return WanderingLoad().starts(scales)
-
-    def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
-        return scales.order > 0
 
     @staticmethod
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:

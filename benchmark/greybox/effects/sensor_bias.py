@@ -11,8 +11,7 @@ from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, Signa
 from simgap.registry import EFFECTS
 
 
-@final
-class SteadySensorBias(OutputEffect):
+class _Bias(OutputEffect):
     """reading = y + b."""
 
     name: ClassVar[str] = "sensor_bias"
@@ -22,10 +21,7 @@ class SteadySensorBias(OutputEffect):
         "encoder that counts from wherever it was switched on."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
-    linear: ClassVar[bool] = True
     of_one_mass: ClassVar[bool] = True
-    # As without a load: what holds it at the wrong reading would drive it away.
-    may_move_poles_of: ClassVar[tuple[str, ...]] = ("position",)
     shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
@@ -39,14 +35,23 @@ class SteadySensorBias(OutputEffect):
         """Start from a small bias; its amplitude, and so its sign, is then estimated."""
         return [Start((0.1 * scales.y_rms,), amplitude=0)]
 
-    def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether the plain model lacks an operating point that is fitted."""
-        return scales.at_zero
-
     @staticmethod
     def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Return y + p[0]."""
         return y + p[0]
+
+
+@final
+class SteadySensorBias(_Bias):
+    """reading = y + b, with the same b in all experiments."""
+
+    linear: ClassVar[bool] = True
+    # The mean input that holds it at the true position drives a plant away that is modelled without a bias.
+    may_move_poles_of: ClassVar[tuple[str, ...]] = ("position",)
+
+    def applies_to(self, scales: SignalScales) -> bool:
+        """Tell whether the plain model lacks an operating point that is fitted."""
+        return scales.at_zero
 
     @staticmethod
     def step(y, p, i, m, j, h, k):
@@ -56,27 +61,12 @@ class SteadySensorBias(OutputEffect):
 
 @EFFECTS.register("sensor_bias")
 @final
-class SensorBias(OutputEffect):
+class SensorBias(_Bias):
     """reading = y + b, with another b in every experiment."""
 
-    name: ClassVar[str] = SteadySensorBias.name
-    title: ClassVar[str] = SteadySensorBias.title
-    explanation: ClassVar[str] = SteadySensorBias.explanation
-    reference: ClassVar[str] = SteadySensorBias.reference
     own: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
-    of_one_mass: ClassVar[bool] = True
     steady: ClassVar[type[Effect] | None] = SteadySensorBias
-    shows_in: ClassVar[tuple[ViewName, ...]] = SteadySensorBias.shows_in
-    confounders: ClassVar[dict[str, str]] = SteadySensorBias.confounders
-
-    def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
-        """Return the bias."""
-        return SteadySensorBias().parameters(scales)
-
-    def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from a small bias; its amplitude, and so its sign, is then estimated."""
-        return SteadySensorBias().starts(scales)
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the reading has a zero of its own; that of any other quantity is its operating point."""
@@ -86,8 +76,3 @@ class SensorBias(OutputEffect):
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:
         """Return 1."""
         return np.ones((1, len(t)))
-
-    @staticmethod
-    def term(y: np.ndarray, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return y + p[0]."""
-        return SteadySensorBias.term(y, p, t)

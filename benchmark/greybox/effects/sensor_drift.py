@@ -17,9 +17,8 @@ def _slope(scales: SignalScales) -> Parameter:
     return Parameter("slope", scales.y_unit + "/s" if scales.y_unit else "1/s", -most, most)
 
 
-@final
-class SteadySensorDrift(OutputEffect):
-    """reading = y + r t + b, t since the machine began to run; b is zero where the plant has an operating point."""
+class _Drift(OutputEffect):
+    """A reading that drifts, whatever its law."""
 
     name: ClassVar[str] = "sensor_drift"
     title: ClassVar[str] = "sensor drift"
@@ -28,11 +27,17 @@ class SteadySensorDrift(OutputEffect):
         "creeping load cell."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
+    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since the start", "drift within experiment")
+
+
+@final
+class SteadySensorDrift(_Drift):
+    """reading = y + r t + b, t since the machine began to run; b is zero where the plant has an operating point."""
+
     of_time: ClassVar[bool] = True
     contains: ClassVar[Mapping[str, tuple[int, ...]]] = {"sensor_bias": (1,)}
     instead_of_order: ClassVar[bool] = True
     moves_poles: ClassVar[bool] = True
-    shows_in: ClassVar[tuple[ViewName, ...]] = ("time since the start", "drift within experiment")
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the slope of the drift, and how far off the reading was when the machine began to run."""
@@ -57,17 +62,12 @@ class SteadySensorDrift(OutputEffect):
 
 @EFFECTS.register("sensor_drift")
 @final
-class SensorDrift(OutputEffect):
+class SensorDrift(_Drift):
     """reading = y + r t, t since its start, with another slope r in every experiment."""
 
-    name: ClassVar[str] = SteadySensorDrift.name
-    title: ClassVar[str] = SteadySensorDrift.title
-    explanation: ClassVar[str] = SteadySensorDrift.explanation
-    reference: ClassVar[str] = SteadySensorDrift.reference
     own: ClassVar[int] = 1
     per_experiment: ClassVar[bool] = True
     steady: ClassVar[type[Effect] | None] = SteadySensorDrift
-    shows_in: ClassVar[tuple[ViewName, ...]] = SteadySensorDrift.shows_in
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the slope of the drift."""

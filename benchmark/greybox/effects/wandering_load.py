@@ -11,12 +11,8 @@ from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, SignalScales, Start
 
 
-@final
-class WanderingLoad(ForceEffect):
-    """f = sum over k of r_k sqrt(2 k + 1) P_k(2 t / T - 1), P_k of Legendre, with other r in every experiment of T s.
-
-    The norm of r is the rms of the load.
-    """
+class DriftingLoad(ForceEffect):
+    """A load that changes slowly, whatever its law."""
 
     name: ClassVar[str] = "load_drift"
     title: ClassVar[str] = "a drifting load"
@@ -25,9 +21,7 @@ class WanderingLoad(ForceEffect):
         "a cable that winds up, a bearing that warms."
     )
     reference: ClassVar[str] = "Ljung, System Identification, 1999, section 14.1"
-    own: ClassVar[int] = 5
     substeps: ClassVar[int] = 1
-    per_experiment: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("drift within experiment", "time since the start")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": (
@@ -50,6 +44,17 @@ class WanderingLoad(ForceEffect):
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
         return scales.order > 0
+
+
+@final
+class WanderingLoad(DriftingLoad):
+    """f = sum over k of r_k sqrt(2 k + 1) P_k(2 t / T - 1), P_k of Legendre, with other r in every experiment of T s.
+
+    The norm of r is the rms of the load.
+    """
+
+    own: ClassVar[int] = 5
+    per_experiment: ClassVar[bool] = True
 
     @staticmethod
     def shapes(t: np.ndarray, duration: float) -> np.ndarray:
