@@ -9,6 +9,8 @@ from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
 from simgap.registry import EFFECTS
 
+REPEATS = 2  # periods within a record, at least: any slow noise looks like a part of a sine
+
 
 @EFFECTS.register("periodic_disturbance")
 @final
@@ -40,7 +42,7 @@ class PeriodicDisturbance(ForceEffect):
         """Return the amplitude, the frequency, and the phase at the start of a run."""
         return (
             Parameter("amplitude", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),
-            Parameter("frequency", "Hz", 1 / scales.duration, 0.5 / scales.dt),
+            Parameter("frequency", "Hz", REPEATS / scales.duration, 0.5 / scales.dt),
             Parameter("phase", "rad", -20.0, 20.0),
         )
 
@@ -49,6 +51,7 @@ class PeriodicDisturbance(ForceEffect):
         return [
             Start((0.1 * scales.force_rms, frequency, phase), amplitude=0)
             for frequency in scales.lines
+            if frequency * scales.duration >= REPEATS
             for phase in (0.0, 1.57)
         ]
 
