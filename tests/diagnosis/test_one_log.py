@@ -9,10 +9,10 @@ import simgap
 DT, SUBSTEPS = 0.02, 10
 
 
-def log(samples, fade=0.0, hum=0.0, hertz=1.37, reading=0.0, load=0.0):
+def log(samples, fade=0.0, hum=0.0, hertz=1.37, reading=0.0, load=0.0, bias=0.0):
     """Record voltage and speed; the gain falls by a share `fade` over the log, `hum` in rad/s^2 shakes the motor.
 
-    The reading is off by `reading` rad/s at its end, a brake takes `load` in rad/s^2 by then.
+    The reading is off by `bias` rad/s, and by `reading` more at the end; a brake takes `load` in rad/s^2 by then.
     """
     rng = np.random.default_rng(5)
     voltage = np.repeat(rng.uniform(-5.0, 5.0, samples // 40 + 1), 40)[:samples]
@@ -23,7 +23,7 @@ def log(samples, fade=0.0, hum=0.0, hertz=1.37, reading=0.0, load=0.0):
     for k in range(1, len(speed)):
         speed[k] = speed[k - 1] + DT / SUBSTEPS * (pushed[k - 1] - speed[k - 1] / 0.4)
     speed = speed[::SUBSTEPS]
-    speed += 0.02 * np.std(speed) * rng.standard_normal(samples) + np.linspace(0.0, reading, samples)
+    speed += 0.02 * np.std(speed) * rng.standard_normal(samples) + bias + np.linspace(0.0, reading, samples)
     table = pd.DataFrame({"t": DT * np.arange(samples), "voltage [V]": voltage, "speed [rad/s]": speed})
     return simgap.load(table, inputs=["voltage"], outputs=["speed"])
 
@@ -60,6 +60,11 @@ def test_a_drift_that_goes_on_evenly_is_named_and_whether_of_sensor_or_load_is_l
         assert slope == pytest.approx(drift.get("reading", -0.4 * drift.get("load", 0.0)), rel=0.05)
     else:
         assert slope == pytest.approx(drift.get("reading", 0.0) / 0.4 - drift.get("load", 0.0), rel=0.05)
+
+
+def test_a_bias_of_the_reading_is_as_good_an_answer_as_a_constant_load():
+    (cause,) = simgap.diagnose(log(4000, bias=3.0), views_too=False).causes
+    assert {cause.effect, *(other.effect for other in cause.confounded_with)} == {"sensor_bias", "constant_load"}
 
 
 def test_of_a_motor_that_does_not_change_nothing_is_said():
