@@ -13,6 +13,7 @@ from simgap.diagnosis.budget import budgets
 from simgap.diagnosis.diagnose import diagnose
 from simgap.diagnosis.odd_runs import odd_runs
 from simgap.diagnosis.repeats import repeated, variance_of_repeats
+from simgap.greybox.model import GreyBoxModel
 from simgap.known_plant import KnownPlant
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
@@ -140,8 +141,8 @@ def test_the_json_has_the_budget_of_every_output(named):
 
 
 def test_a_run_in_which_a_known_machine_stuck_is_named():
-    class Follows:
-        def simulate(self, u, y_init, since):
+    class Follows(GreyBoxModel):
+        def simulate(self, u, y_init, since=None):
             return u[:, y_init.shape[1] :]
 
     rng = np.random.default_rng(0)

@@ -28,20 +28,24 @@ def log(samples, fade=0.0, hum=0.0, hertz=1.37, reading=0.0, load=0.0, bias=0.0)
     return simgap.load(table, inputs=["voltage"], outputs=["speed"])
 
 
-@pytest.mark.parametrize("samples", [4000, pytest.param(25_000, marks=pytest.mark.slow)])
-def test_a_motor_that_warms_up_in_the_course_of_one_log_is_named_with_its_rate(samples):
-    found = simgap.diagnose(log(samples, fade=0.2), views_too=False)
+def named(table):
+    """The one cause that is named."""
+    found = simgap.diagnose(table, views_too=False)
     (cause,) = found.causes
     assert found.verdict == "named"
+    return cause
+
+
+@pytest.mark.parametrize("samples", [4000, pytest.param(25_000, marks=pytest.mark.slow)])
+def test_a_motor_that_warms_up_in_the_course_of_one_log_is_named_with_its_rate(samples):
+    cause = named(log(samples, fade=0.2))
     assert cause.effect == "gain_fade"
     assert cause.parameters[0].value == pytest.approx(0.2 / (samples * DT), rel=0.05)
 
 
 @pytest.mark.parametrize("samples", [4000, pytest.param(25_000, marks=pytest.mark.slow)])
 def test_hum_keeps_its_phase_through_one_log(samples):
-    found = simgap.diagnose(log(samples, hum=8.0), views_too=False)
-    (cause,) = found.causes
-    assert found.verdict == "named"
+    cause = named(log(samples, hum=8.0))
     assert cause.effect == "periodic_disturbance"
     amplitude, frequency, _ = (p.value for p in cause.parameters)
     assert abs(amplitude) == pytest.approx(8.0, rel=0.05)
@@ -51,9 +55,7 @@ def test_hum_keeps_its_phase_through_one_log(samples):
 @pytest.mark.parametrize("samples", [4000, pytest.param(25_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("drift", [{"reading": 5.0}, {"load": 12.0}])
 def test_a_drift_that_goes_on_evenly_is_named_and_whether_of_sensor_or_load_is_left_open(drift, samples):
-    found = simgap.diagnose(log(samples, **drift), views_too=False)
-    (cause,) = found.causes
-    assert found.verdict == "named"
+    cause = named(log(samples, **drift))
     slope = cause.parameters[0].value * samples * DT
     assert {cause.effect, *(other.effect for other in cause.confounded_with)} == {"sensor_drift", "load_drift"}
     if cause.effect == "sensor_drift":
