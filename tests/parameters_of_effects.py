@@ -9,7 +9,7 @@ def scales(kind="position", order=2):
     return SignalScales(
         kind=kind, order=order, dt=0.1, duration=12.0, u_low=-2.0, u_high=2.0, u_rms=1.0,
         y_low=0.1 if kind == "level" else -3.0, y_high=3.0, y_rms=1.0, x_max=3.0, v_max=4.0, stroke=3.0, force_rms=5.0,
-        u_unit="V", y_unit="rad", lines=(0.5,), quantisation_step=0.1,
+        u_unit="V", y_unit="rad", lines=(0.5,), tones=(0.5,), quantisation_step=0.1,
     )  # fmt: skip
 
 

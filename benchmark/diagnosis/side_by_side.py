@@ -145,8 +145,7 @@ def _error(machine: FittedPlant, simulated: Sequence[Experiment], n_init: int) -
 def _fit(machine: FittedPlant, simulated: Sequence[Experiment], terms: Sequence[Term] | None = None) -> Estimate:
     """Fit the machine's plant, or with some of its effects only, to the simulation."""
     estimate = machine.estimate
-    kept = [t for t in (estimate.plant.terms if terms is None else terms) if t not in estimate.plant.per_experiment]
-    plant = estimate.plant.having(kept)
+    plant = estimate.plant.having(estimate.plant.terms if terms is None else terms).of_all
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
     records = replace(Records.of(simulated, machine.outputs), soft=machine.records.soft)
     return descend(Problem(plant, records, machine.noise), theta, local)

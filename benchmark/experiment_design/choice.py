@@ -119,7 +119,7 @@ def ranked(dataset: Dataset, identified: Sequence[Identified], candidates: Mappi
         before, after = before + now, after + then
     order = np.argsort(after, kind="stable")
     left = after[order] / before if before > 0 else np.ones(len(new))
-    effects = dict.fromkeys(term.effect.title for one in identified for term in one.plant.forecasting.terms)
+    effects = dict.fromkeys(term.effect.title for one in identified for term in one.plant.forecast.plant.terms)
     names = tuple(records[new[k]].name for k in order)
     taken = tuple(x.name for x in records if x.name not in names)
     return Choice(dataset.name, tuple(effects), names, tuple(map(float, left)), taken)
@@ -127,8 +127,7 @@ def ranked(dataset: Dataset, identified: Sequence[Identified], candidates: Mappi
 
 def _expected(fitted: FittedPlant, candidates: Sequence[Experiment], new: Sequence[int]) -> tuple[float, np.ndarray]:
     """Compute the expected squared error over the candidates, in noise: today, and with each new one."""
-    plant, estimate = fitted.forecasting, fitted.estimate
-    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
+    plant, theta, local = fitted.forecast.plant, fitted.forecast.theta, fitted.forecast.local
     sizes = Problem(plant, fitted.records, fitted.noise).sizes(theta)[plant.free]
     held, _ = _of_each(fitted, Records.of(fitted.experiments, fitted.outputs), theta, local, sizes)
     records = Records.of(candidates, fitted.outputs)
@@ -148,7 +147,7 @@ def _of_each(
 
     Both are of the free numbers, each in units of its own size.
     """
-    plant, at_once = fitted.forecasting, max(1, CHUNK // records.u.shape[1])
+    plant, at_once = fitted.forecast.plant, max(1, CHUNK // records.u.shape[1])
     information, slopes = np.empty((2, len(records.u), len(sizes), len(sizes)))
     for first in range(0, len(records.u), at_once):
         some = np.arange(first, min(first + at_once, len(records.u)))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.evidence import CONFOUNDED
@@ -45,20 +46,22 @@ class Rival:
     information: Float[np.ndarray, "p p"]
     behind: float
 
-    @property
-    def plant(self) -> Plant:
-        """The plant with its effects, without what belongs to single experiments."""
-        plant = self.estimate.plant
-        return plant.having([term for term in plant.terms if term not in plant.per_experiment])
+    @cached_property
+    def forecast(self) -> Estimate:
+        """The model with its effects, without what belongs to single experiments."""
+        return self.estimate.of_all
+
+    @cached_property
+    def places(self) -> Int[np.ndarray, " p"]:
+        """Where the numbers of that model stand in theta."""
+        return self.forecast.plant.places_in(self.estimate.plant)
 
     def starts(self, experiments: int) -> Float[np.ndarray, "E q"]:
         """Return the usual initial state, for so many experiments."""
-        plant = self.plant
-        _, local = plant.carry(self.estimate.plant, self.estimate.theta, self.estimate.local)
-        return np.repeat(local.mean(axis=0, keepdims=True), experiments, axis=0)
+        return np.repeat(self.forecast.local.mean(axis=0, keepdims=True), experiments, axis=0)
 
     def likely(self, count: int) -> Float[np.ndarray, "S p"]:
-        """Return theta, and as many draws from what the records leave open of it, from a fixed seed.
+        """Return theta of `forecast`, and as many draws from what the records leave open of it, from a fixed seed.
 
         Directions of which they tell nothing stay as they are.
         """
@@ -68,7 +71,7 @@ class Rival:
         told = size > NOTHING
         normal = np.random.default_rng(0).standard_normal((count, int(told.sum())))
         drawn = theta + (normal / np.sqrt(size[told])) @ along[:, told].T / scale
-        return np.concatenate((theta[None], np.clip(drawn, plant.low, plant.high)))
+        return np.concatenate((theta[None], np.clip(drawn, plant.low, plant.high)))[:, self.places]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,13 +21,15 @@ STEPS = 15
 
 def simulate(rival: Rival, u: Float[np.ndarray, "E T nu"]) -> Float[np.ndarray, "E T ny"]:
     """Simulate a model from its usual initial state."""
-    return Simulator(rival.plant, u).run(rival.estimate.theta, rival.starts(len(u)))
+    return Simulator(rival.forecast.plant, u).run(rival.forecast.theta, rival.starts(len(u)))
 
 
 def simulate_likely(rival: Rival, u: Float[np.ndarray, "E T nu"], draws: int) -> Float[np.ndarray, "S E T ny"]:
     """Simulate a model, and as many draws of its numbers, from its usual initial state."""
     thetas = rival.likely(draws)
-    return Simulator(rival.plant, u).run_many(thetas, np.repeat(rival.starts(len(u))[None], len(thetas), axis=0))
+    return Simulator(rival.forecast.plant, u).run_many(
+        thetas, np.repeat(rival.starts(len(u))[None], len(thetas), axis=0)
+    )
 
 
 def separations(question: Question, u: Float[np.ndarray, "E T nu"]) -> Float[np.ndarray, "P 2 E"]:
@@ -63,16 +65,16 @@ def _left(
     """Compute what a step of the other model leaves of the difference in each record."""
     rival, y = question.rivals[other], simulated[true]
     finite: np.ndarray = np.all(np.isfinite(y) & np.isfinite(simulated[other]), axis=(1, 2))
-    plant, theta = rival.plant, rival.estimate.theta
+    plant, theta = rival.forecast.plant, rival.forecast.theta
     problem = Problem(plant, Records.measured(u, np.where(finite[:, None, None], y, 0.0), plant.dt), question.noise)
-    jacobian = problem.jacobian(theta, rival.starts(len(u)), plant.free & ~rival.held)
+    jacobian = problem.jacobian(theta, rival.starts(len(u)), plant.free & ~rival.held[rival.places])
     e = np.where(finite[:, None, None], y - simulated[other], 0.0)
     e = question.noise.whiten(e).reshape(len(u), -1)  # [E, M]
     slopes = jacobian.slopes.swapaxes(0, 1)  # [E, p + q, M]
     finite = finite & np.all(np.isfinite(slopes), axis=(1, 2))
     slopes = np.where(finite[:, None, None], slopes, 0.0)
     known = np.zeros((slopes.shape[1],) * 2)
-    known[: len(theta), : len(theta)] = rival.information
+    known[: len(theta), : len(theta)] = rival.information[np.ix_(rival.places, rival.places)]
     h = slopes @ slopes.swapaxes(1, 2) + known
     gradient = (slopes @ e[:, :, None])[:, :, 0]
     scale = scales_of(np.diagonal(h, axis1=1, axis2=2))

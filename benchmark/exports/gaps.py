@@ -41,7 +41,7 @@ def gaps_of(subject: Subject, joint: Joint) -> tuple[list[Gap], Joint]:
     for i, one in enumerate(joint.inputs):
         if not one.get("gap", 0.0):
             continue
-        if joint.bias or "lag" in one or subject.model.plants[0].forecasting.kind == "velocity":
+        if joint.bias or "lag" in one or subject.model.plants[0].forecast.plant.kind == "velocity":
             raise UnusableInput("mjcf holds backlash of a position only, without a lag or a constant load beside it")
         largest, reach = (float(abs(ends).max()) for ends in (subject.input_range[:, i], subject.output_range))
         arm = PULLED * largest / ((reach or 1.0) * joint.scale)

@@ -32,7 +32,7 @@ def refusal(kind: type) -> str:
 def joint_of(subject: Subject, table: Mapping[str, tuple[str, str, str]], simulator: str) -> Joint:
     """Turn a grey box into a joint. Raises UnusableInput for what the simulator cannot hold, and without an inertia."""
     fitted = _single(subject, simulator)
-    plant, theta = fitted.forecasting, fitted.estimate.theta
+    plant, theta = fitted.forecast.plant, fitted.forecast.theta
     strange = [term.effect.name for term in plant.terms if term.effect.name not in table]
     if strange:
         able = ", ".join(table)
@@ -55,13 +55,13 @@ def drives(plant: Plant) -> Sequence[int]:
 def steady(subject: Subject) -> Subject:
     """Hold the columns of a machine that no joint has, such as its supply, at the middle of each record."""
     fitted = subject.model.plants[0] if isinstance(subject.model, GreyBoxModel) else None
-    if fitted is None or fitted.forecasting.machine is None:
+    if fitted is None or fitted.forecast.plant.machine is None:
         return subject
     return replace(subject, records=tuple(_steady(subject, one) for one in subject.records))
 
 
 def _steady(subject: Subject, record: CheckRecord) -> CheckRecord:
-    driving = drives(subject.model.plants[0].forecasting)
+    driving = drives(subject.model.plants[0].forecast.plant)
     u = np.tile(usual_inputs(subject.model, record.u), (len(record.u), 1))
     u[:, driving] = record.u[:, driving]
     if not record.n:
@@ -72,7 +72,7 @@ def _steady(subject: Subject, record: CheckRecord) -> CheckRecord:
 
 
 def _of_poles(subject: Subject, fitted: FittedPlant) -> Joint:
-    plant, theta = fitted.forecasting, fitted.estimate.theta
+    plant, theta = fitted.forecast.plant, fitted.forecast.theta
     kind, scale = _scale(subject, fitted.outputs[0])
     gains, poles = theta[plant.layout.gains], theta[plant.layout.poles]
     inertia = _inertia(subject.known, scale * float(gains[0]))
@@ -88,7 +88,7 @@ def _of_poles(subject: Subject, fitted: FittedPlant) -> Joint:
 
 def _of_machine(subject: Subject, fitted: FittedPlant) -> Joint:
     """A machine as it is in the first record: its columns have the value that they have there in the middle."""
-    plant, theta = fitted.forecasting, fitted.estimate.theta
+    plant, theta = fitted.forecast.plant, fitted.forecast.theta
     machine = plant.machine
     assert machine is not None
     if not machine.units[0]:
@@ -124,7 +124,7 @@ def _of_machine(subject: Subject, fitted: FittedPlant) -> Joint:
 
 def _single(subject: Subject, simulator: str) -> FittedPlant:
     fitted, *others = subject.model.plants
-    plant = fitted.forecasting
+    plant = fitted.forecast.plant
     if others:
         raise UnusableInput(f"{simulator} takes one joint, the model has {1 + len(others)} plants")
     rigid = (plant.kind, plant.order) in (("position", 2), ("velocity", 1)) and not plant.joint

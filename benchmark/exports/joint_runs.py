@@ -58,7 +58,7 @@ def write(root: ET.Element, file: Path, subject: Subject, joint: Joint, remake: 
     ET.indent(root)
     file.write_text(ET.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     fitted = subject.model.plants[0]
-    plant, theta = fitted.forecasting, fitted.estimate.theta
+    plant, theta = fitted.forecast.plant, fitted.forecast.theta
     about: dict[str, Any] = {
         "kind": joint.kind, "si_per_unit": joint.scale, "inertia": joint.inertia, "gains": joint.gains,
         "effort": [one.get("clip") for one in joint.inputs], "substeps": SUBSTEPS[joint.rough],

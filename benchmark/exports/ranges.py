@@ -56,14 +56,14 @@ def _of_plant(fitted: FittedPlant, channels: Channels) -> Iterator[Range]:
     inputs, outputs = ([c.name for c in part] for part in (channels.inputs, channels.outputs))
     named = [("linear part", "", *name) for name in linear_names(plant, inputs)]
     for term in plant.terms:
-        if term in plant.per_experiment:
-            continue
         where = {"input": [*inputs, "controller"], "output": [outputs[i] for i in fitted.outputs]}.get(term.effect.port)
         channel = where[term.channel] if where else ""
-        named += [(term.effect.name, channel, p.name, p.unit) for p in plant.parameters_of(term)]
-    for name, parameter, value, a, b in zip(named, plant.parameters, theta, low, high, strict=True):
+        named += [(term.effect.name, channel, p.name, p.unit) for p in plant.common_of(term)]
+    rows = list(zip(named, plant.parameters, theta.tolist(), low.tolist(), high.tolist(), strict=True))
+    for i in fitted.forecast.plant.places_in(plant):
+        (effect, channel, name, unit), parameter, value, least, most = rows[i]
         if not parameter.fixed:
-            yield Range(*name, float(value), float(a), float(b))
+            yield Range(effect, channel, name, unit, value, least, most)
 
 
 def ends(fitted: FittedPlant) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

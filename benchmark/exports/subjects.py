@@ -128,7 +128,7 @@ def friction_record(
     if not any(breakaway):
         return None
     hold = 0.5 * min(filter(None, breakaway))
-    machine = model.plants[0].forecasting.machine
+    machine = model.plants[0].forecast.plant.machine
     driven = machine.of_drive if machine is not None else 0
     top = max(float(largest[driven]), 4 * hold)
     corners = (0.0, top, 0.0, -top, 0.0, hold, hold, -hold, -hold, 0.0)
@@ -136,8 +136,8 @@ def friction_record(
     u[:, driven] = np.interp(np.arange(len(u)) / RAMP, range(len(corners)), corners)
     y_hat = np.empty((len(u), len(about.channels.outputs)))
     for fitted in model.plants:
-        plant = fitted.forecasting
-        run = Simulator(plant, u[None]).run(fitted.estimate.theta, np.zeros((1, plant.n_local)))
+        plant = fitted.forecast.plant
+        run = Simulator(plant, u[None]).run(fitted.forecast.theta, np.zeros((1, plant.n_local)))
         y_hat[:, list(fitted.outputs)] = run[0]
     form, _ = step_of("greybox", model, about)
     return CheckRecord("reversal", u, y_hat[:0], y_hat, form.rest)
@@ -145,7 +145,7 @@ def friction_record(
 
 def usual_inputs(model: GreyBoxModel, u: Float[np.ndarray, "T nu"]) -> Float[np.ndarray, " nu"]:
     """Return the inputs beside the one that moves: the middle of a machine's columns, enabled, else zero."""
-    machine = model.plants[0].forecasting.machine
+    machine = model.plants[0].forecast.plant.machine
     if machine is None:
         return np.zeros(u.shape[1])
     usual = np.median(u, axis=0)
@@ -156,7 +156,7 @@ def usual_inputs(model: GreyBoxModel, u: Float[np.ndarray, "T nu"]) -> Float[np.
 
 def _breakaway(fitted: FittedPlant, others: Float[np.ndarray, " nu"]) -> float:
     """Return the size of the first input, or of a goal, that dry friction just holds at rest; 0 without friction."""
-    plant, theta = fitted.forecasting, fitted.estimate.theta
+    plant, theta = fitted.forecast.plant, fitted.forecast.theta
     frictions = [term for term in plant.on("force") if term.effect.role == "friction"]
     if plant.imposed or not frictions:
         return 0.0

@@ -44,8 +44,8 @@ class PlantWriter:
 
     def __init__(self, fitted: FittedPlant, number: int, cells: Cells, nu: int) -> None:
         self.fitted, self.number, self.name, self.nu = fitted, number, f"plant{number}", nu
-        self.plant: Plant = fitted.forecasting
-        self.theta = fitted.estimate.theta
+        self.plant: Plant = fitted.forecast.plant
+        self.theta = fitted.forecast.theta
         self.of_theta, self.sub = f"P{number}", self.plant.substeps
         self.h = self.plant.dt / self.sub
         if self.plant.by_rate:

@@ -190,7 +190,7 @@ def _extend(
     baseline: Baseline, estimate: Estimate, plant: Plant, term: Term, scored: Sequence[Scored] | None, max_steps: int
 ) -> Estimate | None:
     if term in plant.per_experiment:
-        return baseline.fit(plant.terms, [plant.carry(estimate.plant, estimate.theta, estimate.local)], max_steps)
+        return baseline.fit(plant.terms, started(estimate, plant, term), max_steps)
     if term.effect.moves_poles and plant.machine is None:
         return _from_other_poles(baseline, estimate, plant, term, max_steps)
     scored = score_tests(baseline, estimate, [term])[0] if scored is None else scored
@@ -289,10 +289,10 @@ def add(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate:
 
 
 def started(estimate: Estimate, plant: Plant, term: Term) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Carry a fitted model over into a larger one, with the new term at each of its starts."""
+    """Carry a fitted model over into a larger one, with the new term at each of its starts; its own numbers at zero."""
     starts = []
     for start in plant.starts_of(term):
         theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-        theta[plant.part_of(term)] = start.values
+        theta[plant.part_of(term)] = start.values[len(start.values) - len(plant.common_of(term)) :]
         starts.append((theta, local))
     return starts

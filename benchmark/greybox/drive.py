@@ -1,4 +1,4 @@
-"""What drives a plant in every substep: inputs after their effects, gains, drifts of the load; no measured output."""
+"""What drives a plant in every substep: inputs after their effects, gains, loads; no measured output."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from simgap.greybox.effects.effect import InputEffect
 from simgap.greybox.plant import Plant
+from simgap.greybox.terms import Term
 
 
 def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]:
@@ -33,24 +34,25 @@ class Drive:
             self.u = np.zeros_like(self.u)
             self.u[0, :, 1:] = np.cumsum(0.5 * (v[:, 1:] + v[:, :-1]) * self.h, axis=1)
         self._arrived: dict[bytes, np.ndarray] = {}
-        middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
-        self.drifts = [term for term in plant.per_experiment if term.effect.port == "force"]
-        self._shapes = [term.effect.shapes(middles, plant.dt * u.shape[1]) for term in self.drifts]
+        self._middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
+        self._duration = plant.dt * u.shape[1]
+        self.loads = [term for term in plant.per_experiment if term.effect.port == "force"]
+        self._shaped: dict[Term, tuple[np.ndarray, np.ndarray]] = {}  # by what numbers, in what shapes
         effects = [term for term in plant.terms if term.effect.port == "input"]
         self.depends_on = np.zeros(plant.size, dtype=bool)  # which of theta
-        for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, effects)):
+        for part in (plant.layout.gains, plant.layout.offset, *map(plant.part_of, (*effects, *self.loads))):
             self.depends_on[part] = True
         self._inputs: np.ndarray | None = None  # [nu * taps, E * K], where nothing but gains stands before the plant
-        if not effects and not self.drifts and plant.machine is None:
+        if not effects and not self.loads and plant.machine is None:
             taps = [shifted(one, tap * plant.substeps) for one in self.u for tap in plant.taps]
             self._inputs = np.array(taps).reshape(len(taps), -1)
 
     def of(
         self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
     ) -> Float[np.ndarray, "E K"]:
-        """Compute b u + d after the actuators' effects, for every substep, and the drifts of the load.
+        """Compute b u + d after the actuators' effects, for every substep, and the loads of each experiment.
 
-        `start` is what the terms remember, then the numbers of each drift.
+        `start` is what the terms remember, then the numbers of each such load.
         """
         plant = self.plant
         if plant.machine is not None:
@@ -63,10 +65,16 @@ class Drive:
                 total += gain * shifted(arriving, tap * self.substeps)
         if start is None:
             return total
-        for term, shapes in zip(self.drifts, self._shapes, strict=True):
+        for term in self.loads:
             part = plant.own_part_of(term)
-            total += start[:, part.start - plant.order : part.stop - plant.order] @ shapes
+            total += start[:, part.start - plant.order : part.stop - plant.order] @ self._shapes(term, theta)
         return total
+
+    def _shapes(self, term: Term, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "own K"]:
+        common = theta[self.plant.part_of(term)]
+        if term not in self._shaped or not np.array_equal(self._shaped[term][0], common):
+            self._shaped[term] = common, term.effect.shapes(self._middles, self._duration, common)
+        return self._shaped[term][1]
 
     def of_each(
         self, thetas: Float[np.ndarray, "S p"], starts: Float[np.ndarray, "S E m"]

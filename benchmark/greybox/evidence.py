@@ -166,15 +166,16 @@ class Evidence:
         estimate = self.identified.plant.estimate
         plant, (low, high) = estimate.plant, self._intervals
         parameters = plant.parameters_of(term)
+        own: tuple[Value, ...] = ()
         if term in plant.per_experiment:
             sizes = self.identified.plant.sizes_of_own(term)
             spread, smallest, largest = np.sqrt(np.mean(sizes**2)), np.min(sizes), np.max(sizes)
             name = f"{parameters[0].name}, rms over experiments"
-            return (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
+            own = (Value(name, parameters[0].unit, float(spread), float(smallest), float(largest)),)
         part = plant.part_of(term)
-        rows = zip(parameters, estimate.theta[part], low[part], high[part], strict=True)
+        rows = zip(plant.common_of(term), estimate.theta[part], low[part], high[part], strict=True)
         shown = [row for row in rows if row[0].told]
-        return tuple(Value(p.name, p.unit, float(value), float(a), float(b)) for p, value, a, b in shown)
+        return own + tuple(Value(p.name, p.unit, float(value), float(a), float(b)) for p, value, a, b in shown)
 
     def _rivals(self, term: Term, without: Trial) -> list[Rival]:
         """What could stand in the place of an effect, the nearest first; the other effects stay."""

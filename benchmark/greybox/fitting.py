@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -29,6 +29,13 @@ class Estimate:
     errors: Float[np.ndarray, "E T ny"]
     squares: float
     converged: bool
+
+    @property
+    def of_all(self) -> Estimate:
+        """The same without what belongs to single experiments; the errors are still those beside it."""
+        plant = self.plant.of_all
+        theta, local = plant.carry(self.plant, self.theta, self.local)
+        return replace(self, plant=plant, theta=theta, local=local)
 
 
 def descend(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.stats import wilcoxon
 
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import initial_states, usual_start
-from simgap.greybox.noise import white
+from simgap.greybox.noise import Noise, white
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import RESOLUTION, Records
 
@@ -29,7 +30,7 @@ def errors_on(fit: Estimate, records: Records, n_init: int, train: Records | Non
     noise = white(records.sizes)
     beginning = Problem(fit.plant, records.beginning(n_init), noise)
     start = initial_states(beginning, fit.theta)
-    usual = usual_start(fit.plant, fit, train, noise, n_init) if train is not None else None
+    usual = usual_start(fit, train, noise, n_init) if train is not None else None
     if usual is not None:
         start = usual.beside(beginning, fit.theta, start)
     return Problem(fit.plant, records, noise).errors(fit.theta, start)
@@ -57,6 +58,22 @@ def squares_of_blocks(problem: Problem, errors: np.ndarray) -> np.ndarray:
     squares = np.where(measured, problem.noise.whiten(errors) ** 2 + problem.least, 0.0)
     blocks = np.array_split(squares, max(2, BLOCKS // len(squares)), axis=1)
     return np.concatenate([block.sum(axis=(1, 2)) for block in blocks])
+
+
+def gain_later(records: Records, noise: Noise, before: Estimate, after: Estimate) -> np.ndarray:
+    """Compute what one model takes of another's squared errors in the second half of each record, block by block.
+
+    What is estimated anew in a record is told by its first half.
+    """
+    middle = records.mask.shape[1] // 2
+    first, second = records.mask.copy(), records.mask.copy()
+    first[:, middle:] = second[:, :middle] = False
+    left = []
+    for fit in (before, after):
+        of_first = on_other_records(Problem(fit.plant, replace(records, mask=first), noise), fit.theta)
+        later = Problem(fit.plant, replace(records, mask=second), noise)
+        left.append(squares_of_blocks(later, later.errors(fit.theta, of_first.local)))
+    return left[0] - left[1]
 
 
 def detrended(errors: np.ndarray, mask: np.ndarray) -> np.ndarray:

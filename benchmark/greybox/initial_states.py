@@ -10,7 +10,6 @@ from jaxtyping import Float
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.noise import Noise
 from simgap.greybox.normal_equations import scales_of
-from simgap.greybox.plant import Plant
 from simgap.greybox.problem import LARGEST_ERROR, Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
@@ -55,13 +54,14 @@ class UsualStart:
         return weighed
 
 
-def usual_start(plant: Plant, estimate: Estimate, records: Records, noise: Noise, n_init: int) -> UsualStart | None:
+def usual_start(estimate: Estimate, records: Records, noise: Noise, n_init: int) -> UsualStart | None:
     """Learn which initial states are to be expected, from how the training records start or what they pass through.
 
     Many records tell it by their own starts, few by the states at all their samples, as if the next one began at any of
     them. How much that weighs is what serves free runs in training best, from those starts or from four of each record;
     None where it serves none.
     """
+    plant = estimate.plant
     e, q = len(estimate.local), plant.order
     if not q or plant.sign_hidden:
         return None

@@ -93,8 +93,7 @@ def on_joint(joint: Baseline, rigid: Estimate) -> Estimate:
     plant = joint.plant.having(rigid.plant.terms)
     theta, local = plant.carry(joint.plant, joint.estimate.theta, joint.estimate.local)
     for term in plant.terms:
+        theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
         if term in plant.per_experiment:
             local[:, plant.own_part_of(term)] = rigid.local[:, rigid.plant.own_part_of(term)]
-        else:
-            theta[plant.part_of(term)] = rigid.theta[rigid.plant.part_of(term)]
     return joint.fit(plant.terms, [(theta, local)])

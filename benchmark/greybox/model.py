@@ -68,7 +68,7 @@ class FittedPlant:
             found = descend(pieces, theta, of_pieces, tolerance=tolerance)
             theta, fixed, told = found.theta, everything, uncertainty(found, noise, pieces.records)
         estimate = descend(problem, theta, local, fixed, tolerance=tolerance)
-        usual = usual_start(_forecasting(plant), estimate, problem.records, noise, baseline.n_init)
+        usual = usual_start(estimate.of_all, problem.records, noise, baseline.n_init)
         return cls(
             estimate, noise, baseline.outputs, problem.records, tuple(experiments), baseline.outliers, usual, told
         )
@@ -98,35 +98,35 @@ class FittedPlant:
         if known is not None and known.covariance.shape != 2 * theta.shape:
             raise ValueError("the covariance is not that of such parameters")
         nothing = Records.measured(np.empty((0, 0, plant.nu)), np.empty((0, 0, plant.ny)), plant.dt)
-        estimate = Estimate(plant, theta, np.empty((0, 0)), nothing.y, np.nan, True)
+        estimate = Estimate(plant, theta, np.empty((0, plant.n_local)), nothing.y, np.nan, True)
         return cls(
             estimate, noise, tuple(state["outputs"]), nothing, (), tuple(state["outliers"]), state["usual"], known
         )
 
-    @property
-    def forecasting(self) -> Plant:
-        """The plant without what belongs to single experiments and cannot be forecast."""
-        return _forecasting(self.estimate.plant)
+    @cached_property
+    def forecast(self) -> Estimate:
+        """The model without what belongs to single experiments and cannot be forecast."""
+        return self.estimate.of_all
 
     def simulate_whole(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
         since: Float[np.ndarray, " B"] | None = None,
     ) -> Float[np.ndarray, "B T ny"]:  # fmt: skip
         """Simulate all rows, from the initial state that suits the n measured samples best."""
-        return Simulator(self.forecasting, u, since).run(self.estimate.theta, self.start(u, y_init, since))
+        plant, theta = self.forecast.plant, self.forecast.theta
+        return Simulator(plant, u, since).run(theta, self.start(u, y_init, since))
 
     def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
         """Simulate the training records from the initial states that suit all of each best."""
-        plant, estimate = self.forecasting, self.estimate
-        theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-        return Simulator(plant, self.records.u, self.records.since).run(theta, local)
+        one = self.forecast
+        return Simulator(one.plant, self.records.u, self.records.since).run(one.theta, one.local)
 
     def start(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
         since: Float[np.ndarray, " B"] | None = None,
     ) -> Float[np.ndarray, "B q"]:  # fmt: skip
         """Find the initial states: from the first n samples, and from where the training records start."""
-        plant, theta, n = self.forecasting, self.estimate.theta, y_init.shape[1]
+        plant, theta, n = self.forecast.plant, self.forecast.theta, y_init.shape[1]
         beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt, since), self.noise)
         found = initial_states(beginning, theta)
         return self.usual.beside(beginning, theta, found) if self.usual else found
@@ -135,7 +135,7 @@ class FittedPlant:
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"]
     ) -> Float[np.ndarray, "B T e"]:
         """Simulate what each effect does to the first output: all effects less all but it, from the same start."""
-        plant, theta = self.forecasting, self.estimate.theta
+        plant, theta = self.forecast.plant, self.forecast.theta
         if not plant.terms:
             return np.zeros((*u.shape[:2], 0))
         start = self.start(u, y_init)
@@ -152,7 +152,7 @@ class FittedPlant:
         plant, outputs = self.estimate.plant, list(self.outputs)
         u, y, since = experiment.u[None], experiment.y[None][:, :, outputs], np.array([experiment.since])
         start = self.start(u, y[:, :n_init], since)
-        y_hat = Simulator(self.forecasting, u, since).run(self.estimate.theta, start)[0, n_init:]
+        y_hat = Simulator(self.forecast.plant, u, since).run(self.forecast.theta, start)[0, n_init:]
         if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
             return y_hat  # it grew without bound, which nothing of this experiment can mend
         if plant.per_experiment:
@@ -167,7 +167,7 @@ class FittedPlant:
     def _with_own(self, record: Records, start: np.ndarray, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Simulate with the numbers of this experiment that suit all of it best (Gauss-Newton), from the same start."""
         plant, theta = self.estimate.plant, self.estimate.theta
-        _, local = plant.carry(self.forecasting, theta, start)
+        _, local = plant.carry(self.forecast.plant, self.forecast.theta, start)
         later = np.arange(record.mask.shape[1])[None] >= n_init
         problem = Problem(plant, replace(record, mask=later), white(self.noise.deviations))
         own, of_none = slice(plant.n_start, plant.n_local), np.zeros(plant.size, dtype=bool)
@@ -186,14 +186,12 @@ class FittedPlant:
         return problem.simulator.run(theta, local)[0, n_init:]
 
     def sizes_of_own(self, term: Term) -> Float[np.ndarray, " E"]:
-        """Measure what a term has anew in every training experiment: the rms of a load over it, else its number."""
+        """Measure what a term has anew in every training experiment."""
         plant, measured = self.estimate.plant, self.records.mask
         own = self.estimate.local[:, plant.own_part_of(term)]
-        if term.effect.port != "force":
-            return np.linalg.norm(own, axis=1)
         middles = self.records.dt * (np.arange(measured.shape[1]) + 0.5)
-        load = own @ term.effect.shapes(middles, self.records.duration)  # [E, T]
-        return np.sqrt(np.sum(load**2 * measured, axis=1) / np.maximum(measured.sum(axis=1), 1))
+        shapes = term.effect.shapes(middles, self.records.duration, self.estimate.theta[plant.part_of(term)])
+        return term.effect.size(own, own @ shapes, measured)
 
     def log_likelihood(self) -> float:
         """Compute the log-likelihood of the errors as white noise, up to a constant."""
@@ -254,7 +252,7 @@ class GreyBoxModel:
     @property
     def n_params(self) -> int:
         """Numbers that a simulation uses."""
-        return sum(int(plant.forecasting.free.sum()) for plant in self.plants)
+        return sum(int(plant.forecast.plant.free.sum()) for plant in self.plants)
 
     @property
     def fitted(self) -> dict[str, Any]:
@@ -264,7 +262,3 @@ class GreyBoxModel:
             "order": [plant.order for plant in plants],
             "effects": [[term.effect.name for term in plant.terms] for plant in plants],
         }
-
-
-def _forecasting(plant: Plant) -> Plant:
-    return plant.having([term for term in plant.terms if term not in plant.per_experiment])

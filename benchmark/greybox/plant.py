@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import accumulate
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
@@ -138,7 +138,7 @@ class Plant:
         poles = two_masses.WIDTH if self.joint else len(machines.NAMES) if self.machine else self.order
         gains = 1 if self.machine else self.nu * len(self.taps)
         widths = [poles, gains, int(self.offset), self.zeros, int(self.two_outputs)]
-        widths += [0 if t in self.per_experiment else len(self.parameters_of(t)) for t in self.terms]
+        widths += [len(self.common_of(t)) for t in self.terms]
         slices = [slice(end - width, end) for width, end in zip(widths, accumulate(widths), strict=True)]
         return Layout(*slices[:5], terms=tuple(slices[5:]))
 
@@ -157,13 +157,18 @@ class Plant:
         assert self.scales is not None
         return term.effect.parameters(self.scales.of(term))
 
+    def common_of(self, term: Term) -> tuple[Parameter, ...]:
+        """List those that all experiments have in common, which stand in theta."""
+        parameters, effect = self.parameters_of(term), term.effect
+        return parameters[len(parameters) - effect.common :] if effect.own else parameters
+
     def starts_of(self, term: Term) -> list[Start]:
         """List the points from which a fit of a term begins."""
         assert self.scales is not None
         return term.effect.starts(self.scales.of(term))
 
     def part_of(self, term: Term) -> slice:
-        """Return where the parameters of a term stand in theta."""
+        """Return where the parameters of a term that all experiments have in common stand in theta."""
         return self.layout.terms[self.terms.index(term)]
 
     @cached_property
@@ -242,7 +247,7 @@ class Plant:
         linear += [Parameter("d", "", -inf, inf)] * self.offset
         linear += [Parameter(f"c{i + 1}", "", -inf, inf) for i in range(self.zeros)]
         linear += [Parameter("g", "", -inf, inf)] * self.two_outputs
-        of_terms = [p for t in self.terms if t not in self.per_experiment for p in self.parameters_of(t)]
+        of_terms = [p for t in self.terms for p in self.common_of(t)]
         return (*linear, *of_terms)
 
     @property
@@ -282,11 +287,20 @@ class Plant:
             if term in smaller.remembered:
                 numbers[:, self.start_of(term)] = local[:, smaller.start_of(term)]
         for term in (one for one in self.terms if one in smaller.terms):
+            carried[self.part_of(term)] = theta[smaller.part_of(term)]
             if term in self.per_experiment:
                 numbers[:, self.own_part_of(term)] = local[:, smaller.own_part_of(term)]
-            else:
-                carried[self.part_of(term)] = theta[smaller.part_of(term)]
         return carried, numbers
+
+    @cached_property
+    def of_all(self) -> Plant:
+        """The plant without what belongs to single experiments and cannot be forecast."""
+        return self.having([term for term in self.terms if term not in self.per_experiment])
+
+    def places_in(self, larger: Plant) -> Int[np.ndarray, " p"]:
+        """Return where each of theta stands in that of a plant that has these terms and more."""
+        numbered = np.arange(larger.size, dtype=float)
+        return self.carry(larger, numbered, np.empty((0, larger.n_local)))[0].astype(int)
 
     def on(self, port: str, channel: int = 0) -> list[Term]:
         """List the terms of a port, on one channel where it has several, in their order."""

@@ -30,22 +30,24 @@ def candidates(baseline: Baseline, terms: Sequence[Term] = ()) -> list[Term]:
     taken = {term.key for term in terms}
     contained = {name for term in terms for name in term.effect.contains}
     listed = []
-    for name in EFFECTS.names():
-        effect: Effect = EFFECTS[name]()
-        if effect.own and not baseline.repeated:
-            if effect.steady is None:
-                continue
-            effect = effect.steady()
-        if not effect.simulated or name in contained:
-            continue
-        channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[effect.port]
-        on_channels = [Term(effect, channel) for channel in channels if plant.takes(effect, channel)]
+    for law in [law for name in EFFECTS.names() if name not in contained for law in _laws(EFFECTS[name], baseline)]:
+        channels = {"input": plant.input_channels, "force": range(1), "output": range(plant.ny)}[law.port]
+        on_channels = [Term(law, channel) for channel in channels if plant.takes(law, channel)]
         listed += [
             t for t in on_channels
-            if t.key not in taken and effect.suits(scales.of(t))
+            if t.key not in taken and law.suits(scales.of(t))
             and _has_room(t, terms)
         ]  # fmt: skip
     return listed
+
+
+def _laws(effect: type[Effect], baseline: Baseline) -> list[Effect]:
+    """List the laws of a cause that the number of experiments allows."""
+    if not effect.simulated:
+        return []
+    if effect.own and not baseline.repeated:
+        return [effect.steady()] if effect.steady else []
+    return [effect(), effect.of_each()] if effect.of_each else [effect()]
 
 
 def _has_room(term: Term, terms: Sequence[Term]) -> bool:

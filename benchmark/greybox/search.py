@@ -103,7 +103,7 @@ class Search:
     def _told_apart(self, trial: Trial) -> Trial:
         """Try what has own numbers in each experiment in the place of another, and laws with more of them."""
         for term in trial.terms:
-            if term.effect.own and term in trial.terms:
+            if (term.effect.own or term.effect.of_each) and term in trial.terms:
                 trial = self._better(trial, self._in_place_of(term, trial, "own"))
         for term in candidates(self.baseline):
             if not term.effect.own or term.effect.refined is None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import median_filter
 
 from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.fitting import Estimate
@@ -15,6 +16,7 @@ from simgap.greybox.terms import PlantScales
 from simgap.records import Channels
 
 MAX_LINES = 3
+AROUND = 20  # lines on each side that one is compared with
 # Two neighbouring readings are taken to lie on one grid when this share of all steps are whole multiples of it.
 ON_GRID = 0.999
 
@@ -46,6 +48,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             force_rms=force,
             u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
             lines=lines(estimate.errors[:, :, 0], records.dt, records.since),
+            tones=tones(estimate.errors[:, :, 0], records.dt),
             quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
@@ -68,16 +71,27 @@ def lines(e: Float[np.ndarray, "E T"], dt: float, since: Float[np.ndarray, " E"]
     for begin, of_record in zip(begins, e, strict=True):
         together[begin : begin + len(of_record)] += of_record
     n = 1 << int(np.ceil(np.log2(4 * len(together))))
-    power = np.abs(np.fft.rfft(together, n)) ** 2
-    frequencies = np.fft.rfftfreq(n, dt)
-    power[frequencies < 0.7 / (dt * e.shape[1])] = 0.0
+    return _peaks(np.abs(np.fft.rfft(together, n)) ** 2, np.fft.rfftfreq(n, dt), dt * e.shape[1])
+
+
+def tones(e: Float[np.ndarray, "E T"], dt: float) -> tuple[float, ...]:
+    """Find the frequencies in Hz that stand out from those around them in the errors, whatever their phase."""
+    n = 1 << int(np.ceil(np.log2(4 * e.shape[1])))
+    power = np.sum(np.abs(np.fft.rfft(e, n)) ** 2, axis=0)
+    around = median_filter(power, size=1 + 2 * AROUND * n // e.shape[1], mode="nearest")
+    return _peaks(power / np.maximum(around, 1e-300), np.fft.rfftfreq(n, dt), dt * e.shape[1])
+
+
+def _peaks(power: np.ndarray, frequencies: np.ndarray, duration: float) -> tuple[float, ...]:
+    """List the highest peaks of a spectrum, one for each line that records of this length resolve."""
+    power[frequencies < 0.7 / duration] = 0.0
     found: list[float] = []
     for _ in range(MAX_LINES):
         peak = int(np.argmax(power))
         if power[peak] <= 0:
             break
         found.append(float(frequencies[peak]))
-        power[np.abs(frequencies - frequencies[peak]) < 1.0 / (dt * e.shape[1])] = 0.0
+        power[np.abs(frequencies - frequencies[peak]) < 1.0 / duration] = 0.0
     return tuple(found)
 
 

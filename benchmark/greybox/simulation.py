@@ -109,7 +109,7 @@ class Simulator:
         self._has_sensors = any(term.effect.port == "output" for term in plant.terms)
         self._known = b"", np.empty((0, *u.shape[:2], 1))  # the states [1, E, T, n] of what was simulated last
         self._duration = plant.dt * u.shape[1]
-        forces = [term for term in plant.on("force") if term not in self.drive.drifts]
+        forces = [term for term in plant.on("force") if term not in self.drive.loads]
         forces.sort(key=lambda term: ROLES.index(term.effect.role))
         if len(forces) > SLOTS:
             raise ValueError(f"a model holds up to {SLOTS} forces, this one has {len(forces)}")
@@ -244,10 +244,12 @@ class Simulator:
         plant = self.plant
         for channel in range(plant.ny):
             for term in plant.on("output", channel):
+                p = theta[plant.part_of(term)]
                 if term.effect.own:
-                    y[:, :, channel] += local[:, plant.own_part_of(term)] @ term.effect.shapes(self.t, self._duration)
+                    shapes = term.effect.shapes(self.t, self._duration, p)
+                    y[:, :, channel] += local[:, plant.own_part_of(term)] @ shapes
                 else:
-                    y[:, :, channel] = self._read(term, y[:, :, channel], theta[plant.part_of(term)], local)
+                    y[:, :, channel] = self._read(term, y[:, :, channel], p, local)
 
     def _read(
         self, term: Term, y: Float[np.ndarray, "E T"], p: Float[np.ndarray, " k"], local: Float[np.ndarray, "E q"]

@@ -14,7 +14,7 @@ from simgap.cores import on_cores
 from simgap.error_views.correlation import correlation_time
 from simgap.greybox.baseline import TOLERANCE, Baseline
 from simgap.greybox.fitting import Estimate, descend
-from simgap.greybox.held_out import detrended, in_most, on_other_records, squares_of_blocks
+from simgap.greybox.held_out import detrended, gain_later, in_most, on_other_records, squares_of_blocks
 from simgap.greybox.noise import explained_by_past, log_likelihood, schwarz_order
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import PIECE, Records
@@ -27,6 +27,9 @@ WAYS = 2  # in which an effect may pass: by one-step errors and by free runs
 # What held-out data must add to the log-likelihood: odds of 20 to 1.
 HELD_OUT = 3.0
 CONSISTENT = 1.3
+# Standard deviation of the size of what repeats itself, over its mean; of a swing that chance excites it is 0.52, its
+# amplitude being distributed as Rayleigh found.
+UNEQUAL = 0.25
 WORST = 10.0  # times the squares of the mean model: what the error of a held-out block counts at most
 # Share of the squared error that an effect must explain to be worth a name, however certain it is.
 MATTERS = 0.015
@@ -177,7 +180,8 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
         price = 0.5 * (larger.k_valid - smaller.k_valid) * math.log(baseline.valid.usual_length)
         paid = 0.5 * (larger.k_train - smaller.k_train) * math.log(baseline.train.usual_length)
         straight = free_run_ratio(baseline, smaller, larger) > paid
-        return straight and larger.valid - smaller.valid - price > HELD_OUT
+        held_out = larger.valid - smaller.valid - price > HELD_OUT
+        return straight and held_out and all(_goes_on(baseline, smaller, larger, term) for term in larger.terms)
     # One simulation that grows without bound must not outweigh all other blocks.
     most = WORST * baseline.blocks_of_mean.mean()
     gain = np.minimum(smaller.blocks, most) - np.minimum(larger.blocks, most)
@@ -197,6 +201,21 @@ def holds_out(baseline: Baseline, smaller: Trial, larger: Trial) -> bool:
     if gain.mean() > 0:
         return halves_speak_for(baseline, *fits)
     return pieces_speak_for(baseline, *fits) and halves_speak_for(baseline, *fits, PIECES_LEAVE)
+
+
+def _goes_on(baseline: Baseline, smaller: Trial, larger: Trial, term: Term) -> bool:
+    """Tell whether what should repeat itself does: on from the first half of held-out records, as large in all of them.
+
+    A swing of the machine that its inputs excite is not.
+    """
+    if not term.effect.repeats or term in smaller.terms:
+        return True
+    fit, plant = larger.estimate, larger.estimate.plant
+    held_out = on_other_records(Problem(plant, baseline.valid, baseline.noise), fit.theta)
+    own = np.concatenate((fit.local, held_out.local))[:, plant.own_part_of(term)]
+    sizes = np.linalg.norm(own, axis=1)
+    as_large = sizes.std() < UNEQUAL * sizes.mean()
+    return bool(as_large) and in_most(gain_later(baseline.valid, baseline.noise, smaller.estimate, fit))
 
 
 def pieces_speak_for(baseline: Baseline, one: Estimate, other: Estimate) -> bool:

@@ -110,7 +110,7 @@ def _decoded(text: Any, arrays: dict[str, np.ndarray], parts: dict[str, type]) -
             value = tuple(each(values))
         case {"keys": keys, "values": values}:
             value = dict(zip(each(keys), each(values), strict=True))
-        case {"effect": name} | {"refined": name} | {"steady": name}:
+        case {"effect": name} | {"refined": name} | {"steady": name} | {"of_each": name}:
             (what,) = text
             value = EFFECTS[str(name)].laws()[what]()
         case {"part": name, "state": state}:

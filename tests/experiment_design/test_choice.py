@@ -69,7 +69,7 @@ def test_the_answer_names_record_effects_and_what_it_does_not_count(choice):
 def test_what_is_left_is_what_fits_to_drawn_noise_leave(data, identified, candidates, choice):
     """The mean square over the candidates of simulations after either record, 60 draws."""
     fitted = identified[0].plant
-    plant, noise, theta = fitted.forecasting, fitted.noise, fitted.estimate.theta
+    plant, noise, theta = fitted.forecast.plant, fitted.noise, fitted.forecast.theta
     assert all(np.allclose(polynomial, [1.0]) for polynomial in noise.polynomials), "white noise is drawn below"
     rng, dt = np.random.default_rng(3), data.training.dt
 

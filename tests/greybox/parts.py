@@ -197,6 +197,11 @@ def measured_without_outliers(e, measured):
     return outliers.without_outliers(data, e, outliers.find_outliers(e, measured)).mask
 
 
+def tones(e, dt):
+    """Frequencies that stand out in the errors, whatever their phase."""
+    return signal_scales.tones(e, dt)
+
+
 def lines(e, dt, since=0.0):
     """Frequencies in Hz that the errors [E, T] of all experiments share, which began `since` seconds after the run."""
     return signal_scales.lines(e, dt, np.broadcast_to(since, len(e)))

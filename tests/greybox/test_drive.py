@@ -7,13 +7,14 @@ from parameters_of_effects import scales
 from simgap.greybox.drive import Drive
 from simgap.greybox.effects.dead_zone import DeadZone
 from simgap.greybox.effects.load_drift import LoadDrift
+from simgap.greybox.effects.periodic_disturbance import AnyPhase
 from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
 from simgap.registry import EFFECTS
 
 
-@pytest.mark.parametrize("effects", [(), (DeadZone(),), (LoadDrift(),)])
+@pytest.mark.parametrize("effects", [(), (DeadZone(),), (LoadDrift(),), (AnyPhase(), LoadDrift())])
 @pytest.mark.parametrize("taps", [(0,), (0, -1, 1)])
 @pytest.mark.parametrize("offset", [False, True])
 def test_the_drives_of_several_parameter_vectors_are_those_of_each(effects, taps, offset):

@@ -238,7 +238,9 @@ def test_the_course_of_a_load_that_drifts_is_found_in_every_experiment(rig):
     model.fit(dataset.training, 0)
     fitted, place = model.plants[0], list(RIGS).index(rig)
     t = fitted.records.dt * np.arange(300)
-    loads = fitted.estimate.local[:, fitted.estimate.plant.n_start :] @ LoadDrift.shapes(t, fitted.records.duration)
+    loads = fitted.estimate.local[:, fitted.estimate.plant.n_start :] @ LoadDrift.shapes(
+        t, fitted.records.duration, np.empty(0)
+    )
     # The slopes as the rig draws them: the last of five generators of each place in training and validation.
     places = [(split, i) for split, count in enumerate((8, 4)) for i in range(count)]
     draws = [np.random.default_rng([place, 7, *at]).spawn(5)[4].standard_normal() for at in places]

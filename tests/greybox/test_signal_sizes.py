@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .parts import lattice, lines
+from .parts import lattice, lines, tones
 
 DT, SAMPLES = 0.05, 400
 RESOLUTION = 1 / (DT * SAMPLES)  # Hz
@@ -29,6 +29,12 @@ def test_a_line_whose_phase_differs_between_experiments_cancels():
     shared = errors(4.21, amplitudes=(0.5,), phases=(0.0,) * 4)
     not_shared = errors(1.37, amplitudes=(3.0,), phases=2 * np.pi * np.arange(4) / 4)
     assert lines(shared + not_shared, DT)[0] == pytest.approx(4.21, abs=0.25 * RESOLUTION)
+
+
+def test_a_tone_stands_out_from_what_is_around_it_whatever_its_phase():
+    slow = 20 * np.cumsum(np.random.default_rng(1).standard_normal((4, SAMPLES)), axis=1)
+    hum = errors(4.21, amplitudes=(30.0,), phases=2 * np.pi * np.arange(4) / 4)
+    assert tones(slow + hum, DT)[0] == pytest.approx(4.21, abs=0.25 * RESOLUTION)
 
 
 def test_pieces_of_one_run_tell_a_line_as_finely_as_the_whole_run():

@@ -40,6 +40,7 @@ class SignalScales:
     u_unit: str = ""
     y_unit: str = ""
     lines: tuple[float, ...] = ()  # Hz, frequencies at which the errors of all experiments agree
+    tones: tuple[float, ...] = ()  # Hz, those that stand out in the errors, whatever their phase
     force: str = ""  # unit of the forces, where the inertia is known
     commanded: bool = False  # the input is the command of a controller inside; x_max is then its largest error
     quantisation_step: float = 0.0  # unit of the output: the step of the grid that all readings lie on, 0 without one
@@ -162,6 +163,12 @@ class Effect(ABC):
     # So many numbers are estimated anew in every experiment: it adds each times one of its `shapes` to the reading, or
     # to the forces.
     own: ClassVar[int] = 0
+    # So many of its parameters, the last ones, are those of all experiments nevertheless: its shapes depend on them.
+    common: ClassVar[int] = 0
+    # With its own numbers it goes on in an experiment as it began, and is as large in all of them.
+    repeats: ClassVar[bool] = False
+    # The same cause with numbers of its own in every experiment, tried beside it.
+    of_each: ClassVar[type[Effect] | None] = None
     # The same cause with the same numbers in all experiments: the law where there are too few of them to fit its own.
     steady: ClassVar[type[Effect] | None] = None
     # It depends on the time since the machine began to run.
@@ -200,7 +207,7 @@ class Effect(ABC):
     @classmethod
     def laws(cls) -> dict[str, type[Effect]]:
         """Return all laws of this cause, by what they are to it."""
-        other = {"refined": cls.refined, "steady": cls.steady}
+        other = {"refined": cls.refined, "steady": cls.steady, "of_each": cls.of_each}
         return {"effect": cls} | {what: law for what, law in other.items() if law}
 
     @abstractmethod
@@ -232,9 +239,17 @@ class Effect(ABC):
         raise NotImplementedError
 
     @staticmethod
-    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
-        """Return what each of its own numbers adds [own, T] at the times t [T] of a record, both in s."""
+    def shapes(t: np.ndarray, duration: float, common: np.ndarray) -> np.ndarray:
+        """Return what each of its own numbers adds [own, T] at the times t [T] of a record, both in s.
+
+        `common` are those of its parameters that all experiments have in common.
+        """
         raise NotImplementedError
+
+    @staticmethod
+    def size(own: np.ndarray, added: np.ndarray, measured: np.ndarray) -> np.ndarray:
+        """Return the size [E] of its own numbers [E, own], which have added this [E, T] where it was measured."""
+        return np.linalg.norm(own, axis=1)
 
     def describe(self, values: dict[str, float]) -> str:
         """Say what was found in the words of an engineer, with the estimated values."""

@@ -55,6 +55,6 @@ class LoadDrift(DriftingLoad):
     refined: ClassVar[type[Effect] | None] = WanderingLoad
 
     @staticmethod
-    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+    def shapes(t: np.ndarray, duration: float, common: np.ndarray) -> np.ndarray:
         """Return the line from zero, of rms 1."""
         return math.sqrt(3) * (t / duration)[None]

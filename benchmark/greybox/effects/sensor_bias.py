@@ -73,6 +73,6 @@ class SensorBias(_Bias):
         return scales.kind != "other"
 
     @staticmethod
-    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+    def shapes(t: np.ndarray, duration: float, common: np.ndarray) -> np.ndarray:
         """Return 1."""
         return np.ones((1, len(t)))

@@ -78,7 +78,7 @@ class SensorDrift(_Drift):
         return [Start((_slope(scales).high / 100,), amplitude=0)]
 
     @staticmethod
-    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+    def shapes(t: np.ndarray, duration: float, common: np.ndarray) -> np.ndarray:
         """Return t."""
         return t[None]
 

@@ -41,6 +41,11 @@ class DriftingLoad(ForceEffect):
         """Start from a small load; its course is then estimated."""
         return [Start((0.1 * scales.force_rms,), amplitude=0)]
 
+    @staticmethod
+    def size(own: np.ndarray, added: np.ndarray, measured: np.ndarray) -> np.ndarray:
+        """Return the rms of the load over each record."""
+        return np.sqrt(np.sum(added**2 * measured, axis=1) / np.maximum(measured.sum(axis=1), 1))
+
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether there are dynamics that a load acts through; else it is the reading that drifts."""
         return scales.order > 0
@@ -57,7 +62,7 @@ class WanderingLoad(DriftingLoad):
     per_experiment: ClassVar[bool] = True
 
     @staticmethod
-    def shapes(t: np.ndarray, duration: float) -> np.ndarray:
+    def shapes(t: np.ndarray, duration: float, common: np.ndarray) -> np.ndarray:
         """Return Legendre's polynomials, each of rms 1."""
         powers = np.arange(WanderingLoad.own)
         return np.sqrt(2 * powers + 1)[:, None] * legvander(2 * t / duration - 1, WanderingLoad.own - 1).T
