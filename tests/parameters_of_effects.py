@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.effects.scales import SignalScales
 
 
 def scales(kind="position", order=2):

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.baseline import TOLERANCE, Baseline
-from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.initial_states import UsualStart, initial_states, usual_start
 from simgap.greybox.machine import Machine

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import median_filter
 
-from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records

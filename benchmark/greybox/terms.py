@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
-from simgap.greybox.effects.effect import Effect, SignalScales
+from simgap.greybox.effects.effect import Effect
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.samples import OFFSET
 
 

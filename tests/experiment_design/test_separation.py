@@ -61,7 +61,7 @@ def test_a_fit_of_the_wrong_model_leaves_what_the_linearised_one_promises(questi
 def test_what_another_gain_would_make_good_counts_for_nothing_where_nothing_is_known_of_the_gain(question):
     delayed = question.rivals[0]
     theta = delayed.estimate.theta.copy()
-    theta[delayed.plant.layout.gains] *= 1.01
+    theta[delayed.forecast.plant.layout.gains] *= 1.01
     louder = replace(delayed, estimate=replace(delayed.estimate, theta=theta))
     pair, u = replace(question, rivals=(louder, delayed)), inputs(FAST)
     apart = simulate(louder, u) - simulate(delayed, u)

@@ -6,7 +6,7 @@ import numpy as np
 
 from simgap.greybox import initial_states as starts
 from simgap.greybox import noise, outliers, signal_scales, subspace_start
-from simgap.greybox.effects.effect import SignalScales
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
@@ -175,7 +175,7 @@ def problem_of(made, data, weighing):
 def usual_start(made, data, weighing, n_init):
     """Where the records start beside their first samples, as a fit of their initial states tells it."""
     estimate = descend(Problem(made.plant, data, weighing), made.theta, fixed=np.ones(len(made.theta), dtype=bool))
-    return starts.usual_start(made.plant, estimate, data, weighing, n_init)
+    return starts.usual_start(estimate, data, weighing, n_init)
 
 
 # ------------------------------------------------------------------ what is seen before and after a search

@@ -11,8 +11,8 @@ from scipy.optimize import least_squares
 from simgap.data.simulated.rigs import CATALOGUE, RIGS, hide, physical, suitable
 from simgap.error_views.views import views
 from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
-from simgap.greybox.effects.effect import SignalScales
 from simgap.greybox.effects.load_drift import LoadDrift
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.evidence import separation
 from simgap.records import Channel, Channels, Experiment, Kind
 from simgap.registry import EFFECTS, MODELS

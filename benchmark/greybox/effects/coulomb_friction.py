@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import ClassVar, final
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

@@ -17,9 +17,10 @@ from simgap.greybox.effects.curve import (
     parameters_of_curve,
     starts_of_curve,
 )
-from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, Start
 from simgap.greybox.effects.fine_curve import refined_curve
 from simgap.greybox.effects.finely_curved_sensor import FinelyCurvedSensor
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

@@ -11,8 +11,9 @@ from jaxtyping import Float
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.actuator_lag import lagged, lagged_step
-from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, Start
 from simgap.greybox.effects.kernels import second_order
+from simgap.greybox.effects.scales import SignalScales
 
 FAST = 1e-3  # steps: a filter with a shorter time constant is none
 SHARP = 1e-6  # of the reach of the input: a rounding that is none

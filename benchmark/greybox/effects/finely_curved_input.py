@@ -8,7 +8,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import InputEffect, Parameter, Start
 from simgap.greybox.effects.fine_curve import (
     fine_gains_in_words,
     finely_curved,
@@ -17,6 +17,7 @@ from simgap.greybox.effects.fine_curve import (
     risen,
     starts_of_fine_curve,
 )
+from simgap.greybox.effects.scales import SignalScales
 
 
 @final

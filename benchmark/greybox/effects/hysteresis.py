@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.bouc_wen import BoucWen
-from simgap.greybox.effects.effect import MOTION, Effect, ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.effect import MOTION, Effect, ForceEffect, Parameter, Role, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

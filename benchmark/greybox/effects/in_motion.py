@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, Parameter, Start
+from simgap.greybox.effects.scales import SignalScales
 
 
 class InMotion(Effect):

@@ -9,8 +9,9 @@ import numpy as np
 
 from simgap.error_views.wrong import ViewName
 from simgap.greybox.effects.actuator_lag import lagged, lagged_step
-from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, Start
 from simgap.greybox.effects.filtered_saturation import FilteredSaturation
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

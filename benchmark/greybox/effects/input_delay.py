@@ -8,8 +8,9 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, Start
 from simgap.greybox.effects.in_motion import InMotion
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

@@ -8,7 +8,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from simgap.greybox.effects.effect import Effect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, Parameter, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.effects.wandering_load import DriftingLoad, WanderingLoad
 from simgap.registry import EFFECTS
 

@@ -7,7 +7,8 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import OutputEffect, Parameter, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

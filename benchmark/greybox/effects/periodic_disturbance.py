@@ -8,7 +8,8 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, ForceEffect, Parameter, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 REPEATS = 2  # periods within a record, at least: any slow noise looks like a part of a sine

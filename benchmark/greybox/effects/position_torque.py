@@ -9,8 +9,9 @@ from typing import ClassVar, final
 import numpy as np
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Start
 from simgap.greybox.effects.gravity import radians_per
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 MOST_PERIODS = 40  # in a travel

@@ -10,8 +10,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import Effect, OutputEffect, Parameter, Start
 from simgap.greybox.effects.in_motion import InMotion
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

@@ -6,7 +6,8 @@ import math
 from typing import ClassVar, final
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Role, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import ClassVar, final
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, SignalScales, Start
+from simgap.greybox.effects.effect import MOTION, ForceEffect, Parameter, Role, Start
+from simgap.greybox.effects.scales import SignalScales
 from simgap.registry import EFFECTS
 
 

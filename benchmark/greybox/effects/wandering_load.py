@@ -8,7 +8,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from simgap.error_views.wrong import ViewName
-from simgap.greybox.effects.effect import ForceEffect, Parameter, SignalScales, Start
+from simgap.greybox.effects.effect import ForceEffect, Parameter, Start
+from simgap.greybox.effects.scales import SignalScales
 
 
 class DriftingLoad(ForceEffect):
