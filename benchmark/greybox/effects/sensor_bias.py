@@ -18,14 +18,15 @@ class _Bias(OutputEffect):
     name: ClassVar[str] = "sensor_bias"
     title: ClassVar[str] = "sensor bias"
     explanation: ClassVar[str] = (
-        "The reading is off by a constant, which may differ from experiment to experiment: a zero that was not set, an "
-        "encoder that counts from wherever it was switched on."
+        "The reading is off by a constant: a zero that was not set, or an encoder that counts from wherever it was "
+        "switched on, in another experiment from elsewhere."
     )
     reference: ClassVar[str] = "Titterton and Weston, Strapdown Inertial Navigation Technology, 2004, ch. 4"
     of_one_mass: ClassVar[bool] = True
     shows_in: ClassVar[tuple[ViewName, ...]] = ("experiment", "offset")
     confounders: ClassVar[dict[str, str]] = {
         "sensor_drift": "record for longer: a drift goes on growing, a bias does not",
+        "gravity": "hold the machine at two angles and read them with a level too: a bias is the same at both",
     }
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
