@@ -13,6 +13,7 @@ from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import MAX_TERMS
 from simgap.greybox.terms import Term
+from simgap.greybox.trial import MATTERS_AT_ALL
 from simgap.records import Dataset
 
 # Of what a search that did not end by itself takes of the error: the least that the effects it rests on must take.
@@ -55,27 +56,48 @@ def promise(
 ) -> Promise:
     """Withdraw effects, the last first, until the test experiments confirm the gain of those that are left.
 
-    Where they confirm none, all are suspected. The order was fixed in training; the test data choose no other effect.
-    `before` is the simulation of the test experiments by the `plain` model.
+    The last of these goes, too, where the simulation is better without it. Where the test confirms none, all are
+    suspected. The order was fixed in training; the test data choose no other effect. `before` is the simulation of the
+    test experiments by the `plain` model.
     """
     listed = [(plant, term) for plant in _in_order(evidence) for term in plant.terms]
     least = 0 if any(plant.selection.baseline.outliers for plant in evidence) else 1
-    found, suspected = _causes(evidence, profiles), None
-    for count in range(len(listed), least - 1, -1):
+    found = _causes(evidence, profiles)
+
+    def held(count: int) -> Promise:
         kept = [only(plant, [term for of, term in listed[:count] if of is plant]) for plant in evidence]
         model = GreyBoxModel([plant.identified.plant for plant in kept])
         after = tuple(model.simulate_anew(x, dataset.n_init) for x in dataset.test)
         gain = gains.measure(dataset, before, after, model.own_numbers)
         if not gain.shown and any(map(_keeps_errors, kept)):
             gain = replace(gain, in_pieces=gains.in_pieces(dataset, plain, model))
-        suspected = suspected or Promise((), found, (), model, after, gain)
-        if gain.shown:
-            causes = found if count == len(listed) else _causes(kept, profiles)
-            named = {cause.key for cause in causes}
-            rest = tuple(cause for cause in found if cause.key not in named)
-            return Promise(causes, rest, tuple(kept), model, after, gain)
-    assert suspected is not None, "there is something to promise"
-    return suspected
+        return Promise(found, (), tuple(kept), model, after, gain)
+
+    every = held(len(listed))
+    confirmed = every if every.gain.shown else None
+    for count in range(len(listed) - 1, least - 1, -1):
+        fewer = held(count)
+        if confirmed and not (fewer.gain.shown and _better(fewer, confirmed)):
+            break
+        confirmed = fewer if fewer.gain.shown else None
+    if confirmed is None:
+        return replace(every, causes=(), suspects=found, named=())
+    if confirmed is every:
+        return every
+    causes = _causes(confirmed.named, profiles)
+    named = {cause.key for cause in causes}
+    return replace(confirmed, causes=causes, suspects=tuple(cause for cause in found if cause.key not in named))
+
+
+def _better(fewer: Promise, more: Promise) -> bool:
+    """Tell whether the test experiments are simulated better with fewer effects, by what matters at all.
+
+    Where gains are those of pieces, whole experiments say nothing of it.
+    """
+    if fewer.gain.in_pieces or more.gain.in_pieces:
+        return False
+    left = [(1 - promise.gain.share) ** 2 for promise in (fewer, more)]
+    return left[0] < left[1] - MATTERS_AT_ALL
 
 
 def _keeps_errors(plant: Evidence) -> bool:

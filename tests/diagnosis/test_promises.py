@@ -30,10 +30,11 @@ def identified(two_effects):
 def promised(two_effects, identified, monkeypatch):
     """What is promised where the test data confirm models of up to so many effects."""
 
-    def promised(confirmed, beats_mean=True):
+    def promised(confirmed, beats_mean=True, shares=None):
         def measure(*runs):
-            gain = real(*runs)
-            return replace(gain, low=0.1 if len(tried.pop()) <= confirmed else -0.1, beats_mean=beats_mean)
+            gain, count = real(*runs), len(tried.pop())
+            share = shares[count - 1] if shares else gain.share
+            return replace(gain, share=share, low=0.1 if count <= confirmed else -0.1, beats_mean=beats_mean)
 
         real, tried, only = gains.measure, [], promises.only
         monkeypatch.setattr(promises, "only", lambda plant, terms: (tried.append(terms), only(plant, terms))[1])
@@ -65,6 +66,14 @@ def test_the_effect_that_explains_least_is_withdrawn_first_and_the_other_fitted_
         np.testing.assert_allclose(after, one.model.simulate(x.u[None], x.y[None, :n])[0])
     # Its parameters are those of the model that is named, not of the larger one.
     assert one.causes[0].parameters != both.causes[0].parameters
+
+
+@pytest.mark.parametrize(("shares", "named"), [((0.6, 0.5), 1), ((0.6, 0.5995), 2), ((0.6, 0.61), 2)])
+def test_an_effect_without_which_the_test_data_are_simulated_better_is_withdrawn(promised, shares, named):
+    both = promised(confirmed=2)
+    held = promised(confirmed=2, shares=shares)
+    assert names(held.causes) == names(both.causes)[:named]
+    assert names(held.suspects) == names(both.causes)[named:]
 
 
 def test_where_nothing_is_confirmed_all_are_suspects_and_the_gain_is_theirs(promised):
