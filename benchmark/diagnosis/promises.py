@@ -76,6 +76,8 @@ def promise(
     every = held(len(listed))
     confirmed = every if every.gain.shown else None
     for count in range(len(listed) - 1, least - 1, -1):
+        if confirmed and confirmed.gain.in_pieces:
+            break  # whole experiments, which are compared below, decide nothing
         fewer = held(count)
         if confirmed and not (fewer.gain.shown and _better(fewer, confirmed)):
             break
@@ -90,11 +92,8 @@ def promise(
 
 
 def _better(fewer: Promise, more: Promise) -> bool:
-    """Tell whether the test experiments are simulated better with fewer effects, by what matters at all.
-
-    Where gains are those of pieces, whole experiments say nothing of it.
-    """
-    if fewer.gain.in_pieces or more.gain.in_pieces:
+    """Tell whether whole test experiments are simulated better with fewer effects, by what matters at all."""
+    if fewer.gain.in_pieces:
         return False
     left = [(1 - promise.gain.share) ** 2 for promise in (fewer, more)]
     return left[0] < left[1] - MATTERS_AT_ALL

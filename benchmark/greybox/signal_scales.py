@@ -37,6 +37,8 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
     v_max = float(np.max(np.abs(v))) or size / records.duration
 
     rate = "/s" if plant.by_rate else ""
+    errors = estimate.errors[:, :, 0]
+    together, whatever_phase = lines(errors, records.dt, records.since), tones(errors, records.dt)
 
     def scales(i: int, j: int) -> SignalScales:
         u, y = arriving[i][records.mask], records.y[records.mask][:, j]
@@ -47,8 +49,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             x_max=x_max, v_max=v_max, stroke=_stroke(x, v_max, records) if plant.order == 1 or plant.swings else x_max,
             force_rms=force,
             u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
-            lines=lines(estimate.errors[:, :, 0], records.dt, records.since),
-            tones=tones(estimate.errors[:, :, 0], records.dt),
+            lines=together, tones=whatever_phase,
             quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
