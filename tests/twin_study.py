@@ -49,7 +49,8 @@ def is_open(twins: Twins, answer: NextRecord, truth: str, twin: str) -> bool:
     """Tell whether the answer leaves both twins as rivals."""
     if twins.nominal:
         return bool(answer.rivals) and answer.rivals[0][0].startswith("inertia")
-    rivals = [{t.effect.name for t in r.plant.terms} for q in answer.questions for r in q.rivals if len(q.rivals) > 1]
+    plants = [r.forecast.plant for question in answer.questions if len(question.rivals) > 1 for r in question.rivals]
+    rivals = [{term.effect.name for term in plant.terms} for plant in plants]
     return any(truth in one for one in rivals) and any(twin in one for one in rivals)
 
 
