@@ -15,14 +15,14 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # Called a hundred thousand times by one search or one report; checks would make them several times as slow. Where a
 # search calls often, what is checked must define no function inside another: it is compiled anew at every call.
 CALLED_OFTEN = (
-    "greybox.drive", "greybox.effects.absolute_sensor", "greybox.effects.curve", "greybox.effects.curved_sensor",
-    "greybox.effects.effect", "greybox.effects.fine_curve", "greybox.fitting", "greybox.levenberg", "greybox.machine",
-    "greybox.noise", "greybox.normal_equations", "greybox.plant", "greybox.problem", "greybox.samples",
-    "greybox.simulation", "greybox.terms", "greybox.two_masses", "baselines.estimation.block_error",
-    "baselines.estimation.block_search", "baselines.estimation.blocks", "baselines.estimation.box_jenkins_error",
-    "baselines.estimation.filters", "baselines.estimation.gram", "baselines.estimation.levenberg",
-    "baselines.estimation.monomials", "baselines.estimation.narx_error", "baselines.estimation.output_error",
-    "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
+    "greybox.drive", "greybox.dynamics", "greybox.effects.absolute_sensor", "greybox.effects.curve",
+    "greybox.effects.curved_sensor", "greybox.effects.effect", "greybox.effects.fine_curve", "greybox.fitting",
+    "greybox.levenberg", "greybox.machine", "greybox.noise", "greybox.normal_equations", "greybox.plant",
+    "greybox.problem", "greybox.samples", "greybox.simulation", "greybox.terms", "greybox.two_masses",
+    "baselines.estimation.block_error", "baselines.estimation.block_search", "baselines.estimation.blocks",
+    "baselines.estimation.box_jenkins_error", "baselines.estimation.filters", "baselines.estimation.gram",
+    "baselines.estimation.levenberg", "baselines.estimation.monomials", "baselines.estimation.narx_error",
+    "baselines.estimation.output_error", "baselines.estimation.polynomial", "baselines.estimation.prediction_error",
     "baselines.estimation.state_space_error", "baselines.estimation.thresholding", "subspace.state_space",
     "results.store", "reports.pooling",
 )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from simgap.diagnosis import gains, unsaid_kinds
 from simgap.findings import Cause, Gain
+from simgap.greybox import dynamics
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import MAX_TERMS
@@ -105,7 +106,7 @@ def _keeps_errors(plant: Evidence) -> bool:
     What has numbers of its own in every experiment would have them in every piece, too, and is not asked.
     """
     records, fit = plant.identified.plant.records, plant.identified.plant.estimate
-    return not fit.plant.n_own and fit.plant.keeps_errors(fit.theta, records.duration)
+    return not fit.plant.n_own and dynamics.keeps_errors(fit.plant, fit.theta, records.duration)
 
 
 def _in_order(evidence: Sequence[Evidence]) -> list[Evidence]:

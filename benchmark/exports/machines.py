@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from simgap.exports.writers import Cells, Law, PlantWriter
+from simgap.greybox import dynamics
 from simgap.greybox.effects.effect import InputEffect
 from simgap.greybox.machine import ARM, BACK_EMF, DAMPING, DERIVATIVE, INERTIA, MASS, STIFFNESS, Machine
 from simgap.greybox.model import FittedPlant
@@ -33,7 +34,7 @@ class MachineWriter(PlantWriter):
 
     def constants(self) -> dict[str, np.ndarray]:
         """Give the parameters, and the row that the output reads."""
-        return {self.of_theta: self.theta, f"C{self.number}": self.plant.readings(self.theta[None]).ravel()}
+        return {self.of_theta: self.theta, f"C{self.number}": dynamics.readings(self.plant, self.theta[None]).ravel()}
 
     def held(self) -> list[int]:
         """List the columns of mass, arm, inertia and the controller's gain."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox import dynamics
 from simgap.greybox.drive import Drive
 from simgap.greybox.effects.effect import Effect, ForceEffect, InputEffect, OutputEffect
 from simgap.greybox.linear_kernels import transition
@@ -78,9 +79,9 @@ class PlantWriter:
     def constants(self) -> dict[str, np.ndarray]:
         """Give the parameters, the transition over a substep, and the rows that the outputs read."""
         plant, n, q = self.plant, self.plant.order, self.number
-        given = {f"P{q}": self.theta, f"C{q}": plant.readings(self.theta[None])[0, : plant.ny, : max(n, 1)]}
+        given = {f"P{q}": self.theta, f"C{q}": dynamics.readings(plant, self.theta[None])[0, : plant.ny, : max(n, 1)]}
         if n:
-            matrices, a = np.empty((3, n, n)), plant.matrix(self.theta)
+            matrices, a = np.empty((3, n, n)), dynamics.matrix(plant, self.theta)
             transition(a, self.h, *matrices)
             given |= dict(zip((f"E{q}", f"G{q}", f"R{q}"), matrices, strict=True))
             given[f"RATES{q}"], given[f"CARRIED{q}"] = -np.diag(a), carried(plant, a)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from simgap.greybox import dynamics
 from simgap.greybox.fitting import Estimate, best_descent
 from simgap.greybox.held_out import block_errors, squares_of_blocks
 from simgap.greybox.noise import Noise, white_as_large_as
@@ -56,7 +57,7 @@ class Baseline:
     @property
     def keeps_errors(self) -> bool:
         """Whether an error of the state stays to the end of a held-out record, as where the plant integrates."""
-        return self.plant.keeps_errors(self.estimate.theta, self.valid.duration)
+        return dynamics.keeps_errors(self.plant, self.estimate.theta, self.valid.duration)
 
     @property
     def resolution(self) -> Float[np.ndarray, " ny"]:

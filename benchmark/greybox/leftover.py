@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.findings import Offer
+from simgap.greybox import dynamics
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.noise import white
 from simgap.greybox.normal_equations import LARGEST_SLOPE, Jacobian
@@ -55,7 +56,7 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     for part in ("poles", "zeros", "velocity") if plant.machine is None else ():
         theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
     if plant.machine is not None:  # as linear as it is where it hangs
-        theta[: plant.order] = -plant.matrix(estimate.theta)[-1, ::-1]
+        theta[: plant.order] = -dynamics.matrix(plant, estimate.theta)[-1, ::-1]
     thetas = np.repeat(theta[None], len(names), axis=0)
     thetas[:, plain.layout.gains] = np.eye(len(names))
     runs = simulator.run_many(thetas, np.zeros((len(names), n, plain.n_start)))

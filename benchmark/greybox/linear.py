@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from simgap.greybox import dynamics
 from simgap.greybox.additions import add, refine
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
@@ -217,7 +218,7 @@ def _of_order(
 
 def _is_of_the_input(fit: Estimate, train: Records) -> bool:
     """Tell whether all poles act within a record; a slower one beside its zero is an offset of each record."""
-    return fit.plant.slowest(fit.theta) * train.duration > 1
+    return dynamics.slowest(fit.plant, fit.theta) * train.duration > 1
 
 
 def _likelier(larger: Sequence[Estimate], smaller: Sequence[Estimate], train: Records) -> bool:

@@ -14,13 +14,11 @@ from jaxtyping import Bool, Float, Int
 from simgap.greybox import machine as machines
 from simgap.greybox import two_masses
 from simgap.greybox.effects.effect import Effect, InputEffect, Parameter, Start
-from simgap.greybox.linear_kernels import companion
 from simgap.greybox.terms import PlantScales, Term
 from simgap.records import Kind
 
 FASTEST_TANK, FASTEST = 5.0, 1e6  # of poles, per sample
 SUBSTEPS = 16  # in the fastest time constant; the error of the simulation grows with the square of their length
-SETTLED = 3.0  # time constants in which 95 % of an error is gone
 MAX_TERMS = 5  # that a search may find
 MOST_OF_A_MACHINE = 8
 
@@ -316,38 +314,3 @@ class Plant:
         asked = max((term.effect.substeps for term in self.terms), default=1)
         enough = SUBSTEPS * self.scales.fastest * self.dt if self.scales else math.inf
         return max(1, math.ceil(min(asked, enough)))
-
-    def matrix(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "n n"]:
-        """Return A of z' = A z + (inputs and forces)."""
-        sections, n = theta[self.layout.poles], self.order
-        if self.machine is not None:
-            return self.machine.linear(theta, n)
-        if self.joint:
-            return two_masses.matrix(sections)
-        if self.cascade:
-            return np.diag(-sections) + np.diag(sections[:-1], -1)
-        a = np.empty((n, n))
-        companion(sections, a)
-        return a
-
-    def slowest(self, theta: Float[np.ndarray, " p"]) -> float:
-        """Return the size of the slowest pole, in 1/s; 0 where the plant integrates."""
-        return float(np.min(np.abs(np.linalg.eigvals(self.matrix(theta)))))
-
-    def keeps_errors(self, theta: Float[np.ndarray, " p"], duration: float) -> bool:
-        """Tell whether an error of the state is still there after so many seconds, as where the plant integrates."""
-        has_poles = self.order > 0 and not self.imposed and self.machine is None
-        return has_poles and self.slowest(theta) * duration < SETTLED
-
-    def readings(self, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S ny n"]:
-        """Return C of y = C z, before the sensors' effects; z = (force, rate) of an imposed motion."""
-        c = np.zeros((len(thetas), self.ny, 2 if self.imposed else self.order))
-        if self.cascade:
-            c[:, 0, -1] = 1.0
-            return c
-        at = two_masses.MEASURED[self.joint]
-        c[:, 0, at] = 1.0
-        c[:, 0, 1 : 1 + self.zeros] = thetas[:, self.layout.zeros]
-        if self.two_outputs:
-            c[:, 1, at + 1] = thetas[:, self.layout.velocity][:, 0]
-        return c

@@ -9,6 +9,7 @@ from itertools import combinations, combinations_with_replacement
 import numpy as np
 
 from simgap.cores import on_cores
+from simgap.greybox import dynamics
 from simgap.greybox.fitting import MAX_STEPS, Estimate, best_descent, descend
 from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.plant import Plant
@@ -87,7 +88,7 @@ def _gains_zeros(smaller: Plant, plant: Plant) -> bool:
 def _zeros_at_new_poles(plant: Plant, theta: np.ndarray, smaller: Estimate) -> np.ndarray:
     """Begin as the smaller model: with its zeros, and one in the place of each pole that it does not have."""
     denominators = (
-        np.array([1.0, *-p.matrix(t)[-1, ::-1]]) for p, t in ((plant, theta), (smaller.plant, smaller.theta))
+        np.array([1.0, *-dynamics.matrix(p, t)[-1, ::-1]]) for p, t in ((plant, theta), (smaller.plant, smaller.theta))
     )
     new, rest = np.polydiv(*denominators)
     zeros = np.array([1.0, *smaller.theta[smaller.plant.layout.zeros]])  # c_0 + c_1 s + ..
@@ -126,7 +127,7 @@ def refit_from_poles(
 
 def _same_gain(plant: Plant, before: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Scale the gains so that the steady gain stays what it was with other poles."""
-    now, then = (abs(float(np.linalg.det(plant.matrix(values)))) for values in (theta, before))
+    now, then = (abs(float(np.linalg.det(dynamics.matrix(plant, values)))) for values in (theta, before))
     if plant.cascade:  # inflow in units of the last tank
         now, then = float(theta[plant.order - 1]), float(before[plant.order - 1])
     # An integrator has no steady gain, and what comes near it none that is worth keeping.

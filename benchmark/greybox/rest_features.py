@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.signal import lfilter
 
+from simgap.greybox import dynamics
 from simgap.greybox.plant import Plant
 
 SHAPES_AT_A_TIME = 25  # so that the features of a long record need not all fit into memory
@@ -91,7 +92,7 @@ def denominator_of(plant: Plant, theta: Float[np.ndarray, " p"], samples: int) -
     """Compute 1 + a1 q^-1 + .. with the poles of a plant; one that integrates forgets over so many samples."""
     if plant.imposed:
         return np.ones(1)
-    poles = np.exp(np.linalg.eigvals(plant.matrix(theta)) * plant.dt)
+    poles = np.exp(np.linalg.eigvals(dynamics.matrix(plant, theta)) * plant.dt)
     slowest = np.exp(-1.0 / samples)
     return np.real(np.poly(poles * np.minimum(1.0, slowest / np.maximum(np.abs(poles), slowest / 2))))
 

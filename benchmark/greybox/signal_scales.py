@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import median_filter
 
+from simgap.greybox import dynamics
 from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.problem import Problem
@@ -53,7 +54,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
-    poles = np.linalg.eigvals(plant.matrix(estimate.theta)) if plant.order else np.zeros(1)
+    poles = np.linalg.eigvals(dynamics.matrix(plant, estimate.theta)) if plant.order else np.zeros(1)
     at_inputs, at_outputs = tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny))
     return PlantScales(at_inputs, at_outputs, float(np.max(np.abs(poles))))
 

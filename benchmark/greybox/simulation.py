@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numba import cfunc, types
 
+from simgap.greybox import dynamics
 from simgap.greybox.drive import Drive
 from simgap.greybox.effects.effect import OutputEffect, Role
 from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body, run_tanks
@@ -67,7 +68,7 @@ def seen(plant: Plant, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray, "S
     """Return c of the velocity c z that forces see; it has no more than the states of a body in registers."""
     c = np.zeros((len(thetas), 4))
     if plant.swings:
-        c[:, : plant.order] = plant.readings(thetas)[:, 0]
+        c[:, : plant.order] = dynamics.readings(plant, thetas)[:, 0]
     else:
         c[:, min(1, plant.order - 1)] = 1.0
     return c
@@ -137,7 +138,7 @@ class Simulator:
         n, s = plant.order, len(thetas)
         at_start, begun = np.ascontiguousarray(starts[:, :, :n]), starts[:, :, n:]
         of_poles, place = distinct(thetas[:, plant.layout.poles])
-        matrices = np.array([plant.matrix(theta) for theta in thetas[of_poles]])
+        matrices = np.array([dynamics.matrix(plant, theta) for theta in thetas[of_poles]])
         steps = np.empty((3, len(matrices), n, n))
         transitions(matrices, self.h, *steps)
         e, g0, g1 = steps.take(place, axis=1)
@@ -227,7 +228,7 @@ class Simulator:
         place = {known: -1} | {key: i for i, key in enumerate(row_of)}
         which = np.array([place[key] for key in keys])
         y = np.empty((len(keys), *self.shape[:2], plant.ny))
-        readings = plant.readings(thetas)
+        readings = dynamics.readings(plant, thetas)
         with np.errstate(over="ignore", invalid="ignore"):
             read(states_known, states, which, readings, y)
             if self._has_sensors:

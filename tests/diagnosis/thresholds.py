@@ -38,7 +38,7 @@ THRESHOLDS = (
     ("simgap.greybox.trial", "WORST"),
     ("simgap.greybox.search", "BETTER"),
     ("simgap.greybox.search", "CONFIRMED"),
-    ("simgap.greybox.plant", "SETTLED"),
+    ("simgap.greybox.dynamics", "SETTLED"),
     ("simgap.greybox.linear", "WORTH_AN_ORDER"),
     ("simgap.greybox.linear", "UNEXPLAINED"),
     ("simgap.greybox.linear", "EARLY"),

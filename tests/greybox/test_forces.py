@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from parameters_of_effects import scales
 
+from simgap.greybox import dynamics
 from simgap.greybox.effects.coulomb_friction import CoulombFriction
 from simgap.greybox.effects.cubic_stiffness import CubicStiffness
 from simgap.greybox.linear_kernels import transition
@@ -32,7 +33,7 @@ def test_a_force_acts_on_a_body_of_any_order_as_in_a_loop_in_python(order):
     u, starts = rng.standard_normal((3, 40, 1)), 0.1 * rng.standard_normal((2, 3, order))
     found = Simulator(plant, u).states(np.stack([theta, theta]), starts)
     e, g0, g1 = np.empty((3, order, order))
-    transition(plant.matrix(theta), DT / plant.substeps, e, g0, g1)
+    transition(dynamics.matrix(plant, theta), DT / plant.substeps, e, g0, g1)
     for s, experiment in np.ndindex(2, 3):
         z, before = starts[s, experiment], 0.0
         for step in range(40 * plant.substeps):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simgap.greybox import pole_search, unfolding
+from simgap.greybox import dynamics, pole_search, unfolding
 from simgap.greybox.identification import identify
 from simgap.greybox.plant import Plant as GreyBox
 from simgap.records import TrainingSet
@@ -22,7 +22,7 @@ def coupled_drives():
 
 
 def poles_of(fit):
-    return np.sort_complex(np.linalg.eigvals(fit.plant.matrix(fit.theta)))
+    return np.sort_complex(np.linalg.eigvals(dynamics.matrix(fit.plant, fit.theta)))
 
 
 TRUE_POLES = np.sort_complex(np.array([-RATE, -DAMPING - 1j * SWING, -DAMPING + 1j * SWING]))

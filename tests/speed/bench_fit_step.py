@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import dlsim
 
+from simgap.greybox import dynamics
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
 from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator
@@ -44,7 +45,7 @@ def test_a_free_run_of_a_linear_plant_next_to_scipy(compare, timed):
     u = np.random.default_rng(1).standard_normal((1, 20_000, 1))
     theta = np.array([3.0, 40.0, 2.0, 9.0, 5.0])
     simulator = Simulator(plant, u)
-    a = plant.matrix(theta)
+    a = dynamics.matrix(plant, theta)
     whole = expm(0.01 * np.block([[a, np.eye(4)[:, 3:] * 5.0], [np.zeros((1, 5))]]))
     system = (whole[:4, :4], whole[:4, 4:], np.eye(1, 4), np.zeros((1, 1)), 0.01)
 
