@@ -85,7 +85,7 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     records, plant = baseline.train, trial.estimate.plant
     read = [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]
     means, within = np.array([y.mean() for y in read]), np.sqrt(np.mean([y.var() for y in read]))
-    poles = -np.linalg.eigvals(dynamics.matrix(plant, trial.estimate.theta)).real if plant.order else np.ones(1)
+    poles = -np.real(dynamics.poles(plant, trial.estimate.theta)) if plant.order else np.ones(1)
     name = channels.outputs[baseline.outputs[0]].name
     if len(means) > 1 and np.std(means) > within and not baseline.cut:  # else they are those of pieces
         why = f"{name} works at another operating point in each record. Record around one of them"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 from simgap.greybox import two_masses
 from simgap.greybox.linear_kernels import companion
@@ -40,9 +40,14 @@ def readings(plant: Plant, thetas: Float[np.ndarray, "S p"]) -> Float[np.ndarray
     return c
 
 
+def poles(plant: Plant, theta: Float[np.ndarray, " p"]) -> Shaped[np.ndarray, " n"]:
+    """Return the eigenvalues of A, in rad/s, real or complex."""
+    return np.linalg.eigvals(matrix(plant, theta))
+
+
 def slowest(plant: Plant, theta: Float[np.ndarray, " p"]) -> float:
     """Return the size of the slowest pole, in 1/s; 0 where the plant integrates."""
-    return float(np.min(np.abs(np.linalg.eigvals(matrix(plant, theta)))))
+    return float(np.min(np.abs(poles(plant, theta))))
 
 
 def keeps_errors(plant: Plant, theta: Float[np.ndarray, " p"], duration: float) -> bool:

@@ -113,7 +113,7 @@ def moves_by_itself_as(linear: Estimate, chosen: Estimate, duration: float) -> b
 
     From their start they swing on as the disturbance does where every record begins at the same phase, or drift on.
     """
-    of_linear, of_chosen = (np.linalg.eigvals(dynamics.matrix(fit.plant, fit.theta)) for fit in (linear, chosen))
+    of_linear, of_chosen = (dynamics.poles(fit.plant, fit.theta) for fit in (linear, chosen))
 
     def more_near(f: float) -> bool:
         near = [np.sum(np.abs(poles - 2j * math.pi * f) < 2 * math.pi / duration) for poles in (of_linear, of_chosen)]

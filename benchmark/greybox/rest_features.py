@@ -92,7 +92,7 @@ def denominator_of(plant: Plant, theta: Float[np.ndarray, " p"], samples: int) -
     """Compute 1 + a1 q^-1 + .. with the poles of a plant; one that integrates forgets over so many samples."""
     if plant.imposed:
         return np.ones(1)
-    poles = np.exp(np.linalg.eigvals(dynamics.matrix(plant, theta)) * plant.dt)
+    poles = np.exp(dynamics.poles(plant, theta) * plant.dt)
     slowest = np.exp(-1.0 / samples)
     return np.real(np.poly(poles * np.minimum(1.0, slowest / np.maximum(np.abs(poles), slowest / 2))))
 

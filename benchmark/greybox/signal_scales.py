@@ -54,7 +54,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             quantisation_step=quantisation_step(records.y[:, :, j]),
         )  # fmt: skip
 
-    poles = np.linalg.eigvals(dynamics.matrix(plant, estimate.theta)) if plant.order else np.zeros(1)
+    poles = dynamics.poles(plant, estimate.theta) if plant.order else np.zeros(1)
     at_inputs, at_outputs = tuple(scales(i, 0) for i in range(plant.nu)), tuple(scales(0, j) for j in range(plant.ny))
     return PlantScales(at_inputs, at_outputs, float(np.max(np.abs(poles))))
 

@@ -22,7 +22,7 @@ def coupled_drives():
 
 
 def poles_of(fit):
-    return np.sort_complex(np.linalg.eigvals(dynamics.matrix(fit.plant, fit.theta)))
+    return np.sort_complex(dynamics.poles(fit.plant, fit.theta))
 
 
 TRUE_POLES = np.sort_complex(np.array([-RATE, -DAMPING - 1j * SWING, -DAMPING + 1j * SWING]))
