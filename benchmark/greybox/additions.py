@@ -88,6 +88,11 @@ def key_of(terms: Sequence[Term], among: Among) -> tuple[frozenset[tuple[str, in
     return frozenset(term.key for term in terms), among
 
 
+def known_fits(extended: Extended, terms: Sequence[Term]) -> list[Estimate]:
+    """List the fits of just these terms among models with one effect more than another."""
+    return [fit for _, fits in extended.values() for fit in fits if set(fit.plant.terms) == set(terms)]
+
+
 def _race(baseline: Baseline, fits: list[Estimate], worth: Callable[[Estimate], bool]) -> list[Estimate]:
     """Go on with fits until all have converged but those that are behind the best by more than their last gain."""
     fits, gains = list(fits), [math.inf] * len(fits)

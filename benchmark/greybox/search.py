@@ -14,6 +14,7 @@ from simgap.greybox.additions import (
     as_special_case,
     extend,
     from_other_poles,
+    known_fits,
     refine,
     simpler,
     with_any_more,
@@ -97,7 +98,7 @@ class Search:
 
     def _without_one(self, trial: Trial) -> Trial | None:
         """Take out the term without which the score is highest."""
-        smaller = on_cores(partial(without, self.baseline, trial, self.noise_order), trial.terms)
+        smaller = self._each_less(trial, [(term, None) for term in trial.terms])
         return max(smaller, key=lambda other: other.score, default=None)
 
     def _told_apart(self, trial: Trial) -> Trial:
@@ -151,7 +152,7 @@ class Search:
         """
         while trial.terms:
             choices = [(term, special) for term in trial.terms for special in (None, *self._special_cases(trial, term))]
-            smaller = on_cores(partial(with_less, self.baseline, trial, self.noise_order), choices)
+            smaller = self._each_less(trial, choices)
             fitted = zip(choices, smaller, strict=True)
             self.parts = {as_set(other.terms): other for (_, special), other in fitted if special is None}
             enough = [
@@ -205,7 +206,12 @@ class Search:
         return assess(self.baseline, estimate, self.noise_order)
 
     def _without(self, trial: Trial, term: Term) -> Trial:
-        return without(self.baseline, trial, self.noise_order, term)
+        return self._each_less(trial, [(term, None)])[0]
+
+    def _each_less(self, trial: Trial, choices: Sequence[tuple[Term, Term | None]]) -> list[Trial]:
+        """Fit a model again without a term, or with a special case of it, for each of these choices."""
+        fits = on_cores(partial(with_less, self.baseline, trial, self.noise_order), choices)
+        return [or_known(self.baseline, self.noise_order, self.extended, fit) for fit in fits]
 
 
 def as_set(terms: Sequence[Term]) -> frozenset[tuple[str, int]]:
@@ -231,16 +237,11 @@ def passes(baseline: Baseline, term: Term, smaller: Trial, larger: Trial) -> boo
     return within - without > CONFIRMED and holds_out(baseline, smaller, larger)
 
 
-def without(baseline: Baseline, trial: Trial, noise_order: int, term: Term) -> Trial:
-    """Fit a model again with one term less."""
-    return only(baseline, trial, noise_order, [other for other in trial.terms if other != term])
-
-
 def with_less(baseline: Baseline, trial: Trial, noise_order: int, less: tuple[Term, Term | None]) -> Trial:
     """Fit a model again without a term, or with a special case of it."""
     term, special = less
     if special is None:
-        return without(baseline, trial, noise_order, term)
+        return only(baseline, trial, noise_order, [other for other in trial.terms if other != term])
     return assess(baseline, as_special_case(baseline, trial.estimate, term, special), noise_order)
 
 
@@ -251,3 +252,12 @@ def only(baseline: Baseline, trial: Trial, noise_order: int, terms: Sequence[Ter
     plain, of_plain = plant.carry(baseline.plant, baseline.estimate.theta, baseline.estimate.local)
     plain[plant.n_linear :] = theta[plant.n_linear :]
     return assess(baseline, baseline.fit(plant.terms, [(theta, local), (plain, of_plain)]), noise_order)
+
+
+def or_known(baseline: Baseline, noise_order: int, extended: Extended, trial: Trial) -> Trial:
+    """Return the better fit of a trial's terms: its own, or one that the search came by on its way to larger models.
+
+    From a model with more effects a fit may end in another valley: a torque by position, in the shortest period.
+    """
+    best = min([trial.estimate, *known_fits(extended, trial.terms)], key=lambda fit: fit.squares)
+    return trial if best is trial.estimate else assess(baseline, best, noise_order)

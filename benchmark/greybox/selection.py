@@ -10,7 +10,7 @@ from simgap.cores import on_cores
 from simgap.greybox.additions import Extended, key_of, with_any_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.search import Round, Search, as_set, only
+from simgap.greybox.search import Round, Search, as_set, only, or_known
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, assess, assessed
 
@@ -41,7 +41,8 @@ class Selection:
         new = {key: terms for key, terms in zip(keys, choices, strict=True) if key not in self.parts}
         new.pop(whole := as_set(self.trial.terms), None)
         fits = on_cores(partial(only, self.baseline, self.trial, self.noise_order), list(new.values()))
-        self.parts.update(zip(new, fits, strict=True))
+        best = [or_known(self.baseline, self.noise_order, self.extended, fit) for fit in fits]
+        self.parts.update(zip(new, best, strict=True))
         return [self.trial if key == whole else self.parts[key] for key in keys]
 
     def without(self, term: Term) -> Trial:

@@ -79,9 +79,11 @@ class LimitedBraking(ForceEffect):
         return [Start((rate, near_zero * rate, largest)) for rate in slow for near_zero in (1.0, 0.0)]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether the output is a velocity, or no motion at all."""
-        return _rate(scales) > 0 and (
-            scales.order == 1 if scales.kind == "velocity" else scales.kind == "other" and scales.order > 0
+        """Tell whether the output is a velocity, or no motion at all, and is ever away from zero."""
+        return (
+            _rate(scales) > 0
+            and _largest(scales) > 0
+            and (scales.order == 1 if scales.kind == "velocity" else scales.kind == "other" and scales.order > 0)
         )
 
     @staticmethod
