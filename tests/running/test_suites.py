@@ -59,7 +59,7 @@ NETWORKS = (
 
 
 def test_the_groups_of_full_and_smoke_are_the_tables_that_stood_there():
-    windowed = {"mode": "windowed", "epochs": 300, "learning_rate": 0.001}
+    windowed = {"mode": "windowed", "epochs": 15, "batches": 40, "learning_rate": 0.001}
     assert load_suite("full").models == (
         *(Entry(name) for name in MODELS), *(Entry(name, windowed, f"{name} windowed") for name in NETWORKS)
     )  # fmt: skip
