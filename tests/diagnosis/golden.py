@@ -87,12 +87,12 @@ def differences(kept: Any, now: Any, at: str = "") -> list[str]:
     0.03 standard errors, or 0.8 % of an interval. Shares of the plain error are compared as such.
     """
     if isinstance(kept, dict) and isinstance(now, dict):
-        missing = [f"{at}.{key} is only in one" for key in kept.keys() ^ now.keys()]
+        found = [f"{at}.{key} is only in one" for key in kept.keys() ^ now.keys()]
         of_interval = 0.01 * (kept["high"] - kept["low"]) if {"value", "low", "high"} <= kept.keys() else 0.0
         for key in kept.keys() & now.keys():
-            if not (of_interval and key in ("value", "low", "high") and abs(kept[key] - now[key]) <= of_interval):
-                missing += differences(kept[key], now[key], f"{at}.{key}")
-        return missing
+            alike = key in ("value", "low", "high") and of_interval and abs(kept[key] - now[key]) <= of_interval
+            found += [] if alike else differences(kept[key], now[key], f"{at}.{key}")
+        return found
     if isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
         return [d for i, pair in enumerate(zip(kept, now, strict=True)) for d in differences(*pair, f"{at}[{i}]")]
     numbers = isinstance(kept, int | float) and isinstance(now, int | float)
