@@ -46,11 +46,11 @@ def heading_of(text: str) -> Heading:
 def time_unit(text: str, unit: str = "") -> str | None:
     """Give the unit of a heading that names the time, empty where it says none; None for any other heading.
 
-    t_ms, time_s and the like count; a capital T is a time only with a unit of time, else a temperature.
+    t_ms, 'time, s' and the like count; a capital T is a time only with a unit of time, else a temperature.
     """
     heading = heading_of(text)
     name, unit = heading.name, heading.unit or unit
-    if not unit and (match := re.fullmatch(r"(.+)_([A-Za-z]+)", name)) and seconds_in(match[2].lower()):
+    if not unit and (match := re.fullmatch(r"(.+)(?:_|,\s*)([A-Za-z]+)", name)) and seconds_in(match[2].lower()):
         name, unit = match[1], match[2].lower()
     small = name.casefold().replace("_", " ").strip()
     unit = unit or UNIT_IN_NAME.get(small, "")

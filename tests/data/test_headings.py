@@ -59,8 +59,9 @@ def test_what_is_no_unit_is_none(text):
     ("text", "unit"),
     [
         ("t", ""), ("Time", ""), ("TIME (s)", "s"), ("t_ms", "ms"), ("time [ms]", "ms"), ("T [s]", "s"),
-        ("Timestamp", ""), ("TIME_US", "us"), ("Elapsed Time (min)", "min"), ("millis", "ms"),
-        ("T", None), ("T [degC]", None), ("t [degC]", None), ("time_step", None), ("thrust", None), ("x [s]", None),
+        ("t, s", "s"), ("Timestamp", ""), ("TIME_US", "us"), ("Elapsed Time (min)", "min"), ("millis", "ms"),
+        ("T", None), ("T [degC]", None), ("t [degC]", None), ("t, left", None), ("time_step", None), ("thrust", None),
+        ("x [s]", None),
     ],
 )  # fmt: skip
 def test_a_time_is_known_by_its_name_unless_its_unit_is_none_of_time(text, unit):
