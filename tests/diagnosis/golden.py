@@ -84,13 +84,15 @@ def differences(kept: Any, now: Any, at: str = "") -> list[str]:
     """Where two answers differ: names at all, parameters by over 1 % of their intervals, other numbers by over 0.1 %.
 
     Another processor ends a fit elsewhere within what it may leave to gain, 0.001 of twice the log-likelihood: that is
-    0.03 standard errors, or 0.8 % of an interval. Shares of the plain error are compared as such.
+    0.03 standard errors, or 0.8 % of an interval. A log-likelihood ratio is compared to 0.1: that of one-step errors is
+    not what a fit minimises. Shares of the plain error are compared as such.
     """
     if isinstance(kept, dict) and isinstance(now, dict):
         found = [f"{at}.{key} is only in one" for key in kept.keys() ^ now.keys()]
         of_interval = 0.01 * (kept["high"] - kept["low"]) if {"value", "low", "high"} <= kept.keys() else 0.0
+        enough = {"value": of_interval, "low": of_interval, "high": of_interval, "log_likelihood_ratio": 0.1}
         for key in kept.keys() & now.keys():
-            alike = key in ("value", "low", "high") and of_interval and abs(kept[key] - now[key]) <= of_interval
+            alike = enough.get(key, 0.0) and abs(kept[key] - now[key]) <= enough[key]
             found += [] if alike else differences(kept[key], now[key], f"{at}.{key}")
         return found
     if isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
