@@ -29,7 +29,7 @@ HOW_TO_READ = (
     "Every model is simulated over the whole test record from its first measured outputs alone (free run). "
     "Fit is 100 (1 - RMSE / standard deviation), pooled over test experiments and outputs; the best of a "
     "column is bold. 'k ahead' is the RMSE of a forecast k samples after the last measured output it uses. "
-    "Where the seeds of a model differ: median (range); those of a deterministic model tell rounding errors apart."
+    "Where the seeds of a model differ: median (range); those of a deterministic model show the effect of rounding."
 )
 
 

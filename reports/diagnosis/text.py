@@ -123,4 +123,4 @@ def _gain(findings: Findings) -> Iterator[str]:
         line = f"{name}: {amount(before, '')} -> {amount(after, unit)}"
         yield f"{line} ({change})" if change else line
     if findings.left > 0.01:
-        yield f"The input could still predict {percent(findings.left)} of the plain model's squared error."
+        yield f"{percent(findings.left)} of the plain model's squared error can still be learned from the input."

@@ -33,12 +33,12 @@ def nothing_found(findings: Findings) -> str:
         learnable = max((budget.learnable for budget in findings.budget), default=0.0)
         if learnable > HARDLY:
             return (
-                f"Nothing is named: {better}, although the input still predicts {percent(learnable)} of its squared "
-                "error on the test experiments."
+                f"Nothing is named: {better}, although {percent(learnable)} of its squared error on the test "
+                "experiments can be learned from the input."
             )
         fits = findings.baseline.get("fit_percent", {}).values()
         worse = " The mean of the output would be a better guess than this model." if any(f < 0 for f in fits) else ""
-        return f"Nothing found: {better}, and the input predicts hardly anything more of its error.{worse}"
+        return f"Nothing found: {better}, and hardly any of its error can be learned from the input.{worse}"
     if not findings.simulation.linear_differs:
         return "Nothing found: your simulation lacks nothing that these data show."
     return (

@@ -26,7 +26,7 @@ def headline(findings: Findings) -> str:
     if findings.verdict == "unexplained":
         return (
             "Something is there, but nothing in the catalogue explains it: "
-            f"{percent(findings.left)} of the squared error could still be predicted from the input."
+            f"{percent(findings.left)} of the squared error can still be learned from the input."
         )
     listed, several = _listed(findings.effects, findings, told_apart=True), len(findings.effects) > 1
     them = "them" if several else "it"

@@ -74,7 +74,7 @@ def test_what_is_learnable_without_a_name_is_not_called_hardly_anything(nothing_
     budget = (Budget("x", {}, 0.57, None, 0.43),)
     assert in_one_line(diagnosis_text(replace(nothing_found, budget=budget))).startswith(
         "cart: Nothing is named: no effect of the catalogue makes the plain linear model simulate these data better, "
-        "although the input still predicts 57 % of its squared error on the test experiments. Plain"
+        "although 57 % of its squared error on the test experiments can be learned from the input. Plain"
     )
 
 
