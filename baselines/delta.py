@@ -55,8 +55,8 @@ class Delta:
 
     @property
     def stochastic(self) -> bool:
-        """Whether the other model is."""
-        return is_stochastic(self.inner)
+        """Whether the other model is; known before the fit."""
+        return is_stochastic(MODELS[self.model](**self.params))
 
     @property
     def earlier_seconds(self) -> float:

@@ -48,8 +48,7 @@ class Ensemble:
             member.fit(data, len(self.members) * seed + number)
         self._chosen = copy.copy(self)
         self._chosen.members = [as_chosen(member) for member in self.members]
-        held_out = data.valid or data.train
-        runs = [free_runs(member.simulate, held_out, data.n_init) for member in self._chosen.members]
+        runs = [free_runs(member.simulate, data.held_out, data.n_init) for member in self._chosen.members]
         simulated, measured = np.array([one for one, _ in runs]), runs[0][1]
         self.weights = self._chosen.weights = stacked(self.models, simulated, measured)
         self.held_out_error = cross_validated(self.models, simulated, measured)
@@ -71,8 +70,8 @@ class Ensemble:
 
     @property
     def stochastic(self) -> bool:
-        """Whether a member is."""
-        return any(map(is_stochastic, self.members))
+        """Whether a member is; known before the fit."""
+        return any(is_stochastic(MODELS[name](**self._params(name))) for name in self.models)
 
     @property
     def n_params(self) -> int:

@@ -67,7 +67,10 @@ class Hybrid:
         return (y_hat + self.rest.predict(u, y_hat))[:, y_init.shape[1] :]
 
     def as_chosen(self) -> Hybrid:
-        """Return both, estimated on the training data alone, as networks of filters always are."""
+        """Return the grey box as estimated on the training data alone, with the networks, which learn from these only.
+
+        Validation data end their training and have a part in how they are scaled.
+        """
         alone = Hybrid()
         alone.grey = self.grey.as_chosen()
         alone.rest = estimated_again(self.rest, alone.grey)

@@ -75,8 +75,8 @@ class Informed:
 
     @property
     def stochastic(self) -> bool:
-        """Whether the other model is; the grey box is not."""
-        return is_stochastic(self.model)
+        """Whether the other model is, which is known before the fit; the grey box is not."""
+        return is_stochastic(MODELS[self.inner]())
 
     @property
     def earlier_seconds(self) -> float:

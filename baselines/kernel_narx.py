@@ -60,7 +60,7 @@ class KernelNarxModel:
         means, sizes, bound = scales(data.train)
         train = scaled(excerpt(data.train, EXCERPT), means, sizes)
         longest = max(len(x) for x in data.train)
-        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        held_out = data.held_out
 
         def solved(regression: Regression, structure: Structure, ridge: float) -> KernelNarx:
             linear, weights = regression.solution(ridge)

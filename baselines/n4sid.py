@@ -55,7 +55,7 @@ class N4sid:
         check_limits(self)
         upper = range(EVERY + 2, self.max_order + 1, 2)
         orders = [self.order] if self.order else [*range(1, min(self.max_order, EVERY) + 1), *upper]
-        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        held_out = data.held_out
         if not held_out:
             check_length(0, 1, data.n_init)
         records = excerpt(data.train, EXCERPT)

@@ -51,7 +51,7 @@ class Sindy:
         """Choose the terms on train and valid, then estimate on both together; nothing here is random."""
         check_limits(self)
         check_length(sum(len(x) - 1 for x in data.train), 3, 1)
-        held_out = [x for x in data.valid or data.train if len(x) > data.n_init]
+        held_out = data.held_out
         records = excerpt(data.train, EXCERPT)
 
         def error(model: PolynomialNarx) -> float:

@@ -149,6 +149,13 @@ class TrainingSet:
         """Sampling time in seconds."""
         return self.train[0].dt
 
+    @property
+    def held_out(self) -> tuple[Experiment, ...]:
+        """What a model may choose on: the validation records longer than n_init, or else those of training."""
+        return tuple(x for x in self.valid if len(x) > self.n_init) or tuple(
+            x for x in self.train if len(x) > self.n_init
+        )
+
     def as_runs(self) -> TrainingSet:
         """Return the same records as if each were a run of its own, for models that are not told the time."""
         train, valid = (tuple(replace(x, since=0.0) for x in records) for records in (self.train, self.valid))
@@ -185,6 +192,10 @@ class Dataset:
                 )
         if not self.sha256:
             object.__setattr__(self, "sha256", self._digest())
+
+    def with_channels(self, channels: Channels) -> Dataset:
+        """Return the same samples with other words about their columns."""
+        return replace(self, training=replace(self.training, channels=channels), channels=channels)
 
     def _digest(self) -> str:
         digest = hashlib.sha256()

@@ -87,13 +87,13 @@ class Registry:
             module = self._index()[name].module
             try:
                 importlib.import_module(module)
-            except ImportError as error:
+            except Exception as error:  # a file under work may fail in any way
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
             return self._targets[name]
         if name in self._plugins():
             try:
                 return self._plugins()[name].load()
-            except Exception as error:  # a stranger's package may fail in any way
+            except Exception as error:  # so may a stranger's package
                 raise UnusableInput(f"{self.kind} {name} is not available: {error}") from error
         alike = get_close_matches(name, self.names(), n=2)
         meant = f" is {' or '.join(alike)} meant?" if alike else ""
@@ -176,11 +176,18 @@ DATASETS = Registry(
 )
 
 
+def file_of(reference: str) -> str:
+    """The file in `path/to/file.py:Class` or `path/to/file.py`; empty for a registered name."""
+    if ".py:" in reference:
+        return reference.rpartition(":")[0]
+    return reference if reference.endswith(".py") else ""
+
+
 def load_class(reference: str) -> type:
     """The class behind `path/to/file.py:Class`, or the only model of `path/to/file.py`. Raises UnusableInput."""
-    file, _, name = reference.rpartition(":") if ".py:" in reference else (reference, "", "")
-    path = Path(file)
-    if path.suffix != ".py":
+    file = file_of(reference)
+    path, name = Path(file), reference.removeprefix(file).removeprefix(":")
+    if not file:
         raise UnusableInput(f"--model {reference}: write it as path/to/my_model.py:MyModel")
     if not path.is_file():
         raise UnusableInput(f"--model {reference}: there is no file {path}")

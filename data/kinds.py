@@ -93,8 +93,7 @@ def with_kinds(dataset: Dataset, kind: str | Mapping[str, str] | None) -> Datase
         if one not in KINDS:
             raise UnusableInput(f"{dataset.name}: {short(name)} cannot be {short(one)}; use one of {', '.join(KINDS)}")
         outputs[found[0]] = replace(outputs[found[0]], kind=one, kind_from="option")
-    channels = replace(dataset.channels, outputs=tuple(outputs))
-    return replace(dataset, training=replace(dataset.training, channels=channels), channels=channels)
+    return dataset.with_channels(replace(dataset.channels, outputs=tuple(outputs)))
 
 
 def told(channels: Channels) -> tuple[str, ...]:

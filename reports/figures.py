@@ -17,6 +17,7 @@ from simgap.reports.latex import to_latex
 from simgap.reports.leaderboard import all_tables, read_suites
 from simgap.reports.pooling import Standing
 from simgap.reports.site.names import file_names
+from simgap.reports.tables import with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,12 +50,14 @@ def write_figures(folder: str | Path = "results", out: str | Path | None = None,
         for title, name in file_names(tables).items():
             written.append(out / f"{name}.tex")
             written[-1].write_text(to_latex(tables[title]), encoding="utf-8")
+    datasets = [(suite, dataset) for suite in collection.standings for dataset in collection.datasets]
+    names = file_names([*collection.standings, *(f"{suite}-{dataset}" for suite, dataset in datasets)])
     for suite, standings in collection.standings.items():
         if crossover.of_crossover(collection.suites[suite]):
-            written += _saved(crossover.drawn(collection.suites[suite], COLOURS), out / file_names([suite])[suite])
+            written += _saved(crossover.drawn(collection.suites[suite], COLOURS), out / names[suite])
         for dataset in collection.datasets:
             here = sorted((s for s in standings if s.dataset == dataset), key=attrgetter("median_fit"), reverse=True)
-            name = file_names([f"{suite}-{dataset}"])[f"{suite}-{dataset}"]
+            name = names[f"{suite}-{dataset}"]
             if figure := _horizons(here[:BEST]):
                 written += _saved(figure, out / f"{name}-horizon")
             copy = collection.copy_of(dataset).dataset
@@ -96,7 +99,7 @@ def _horizons(standings: list[Standing]) -> Figure | None:
         ahead = sorted({h for _, points in listed for h, _ in points})
         axes.set_xticks(ahead, [str(h) for h in ahead], minor=False)
         axes.minorticks_off()
-        axes.set_ylabel(_plain(_with_unit(f"RMSE of {output}", units[output])))
+        axes.set_ylabel(_plain(with_unit(f"RMSE of {output}", units[output])))
     figure.axes[-1].set_xlabel("samples ahead")
     _legend_above(figure)
     return figure
@@ -131,7 +134,7 @@ def _free_run(runs: list[Run], dataset: Dataset) -> Figure:
                 signal.plot(*thin(t, simulated[-1], POINTS), color=colour, linewidth=0.9, label=label)
                 error.plot(*thin(t, y - simulated[-1], POINTS), color=colour, linewidth=0.7)
         signal.set_ylim(axis_range(y, simulated))
-        signal.set_ylabel(_plain(_with_unit(channel.name, channel.unit)))
+        signal.set_ylabel(_plain(with_unit(channel.name, channel.unit)))
         error.set_ylabel("error")
     columns[-1].set_xlabel("time [s]")
     _legend_above(figure)
@@ -157,7 +160,3 @@ def _legend_above(figure: Figure) -> None:
 def _plain(text: str) -> str:
     """Keep matplotlib from reading mathematics into a name."""
     return text.replace("$", r"\$")
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name

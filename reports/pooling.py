@@ -58,12 +58,15 @@ class Standing:
         return Spread.of([-math.inf if nrmse is None else 100 * (1 - nrmse) for nrmse in of_seed.values()])
 
     def rmse_at(self, output: str, horizon: str) -> Spread | None:
-        """Pool the RMSE of the forecast `horizon` samples ahead, over all test experiments."""
+        """Pool the RMSE of the forecast `horizon` samples ahead, over the test experiments that are as long."""
 
         def at_horizon(rows: Sequence[Result]) -> float:
             figures = [_figures(row, output) for row in rows]
-            values = [figure.get("rmse_by_horizon", {}).get(horizon, math.inf) for figure in figures]
-            return pool(values, [figure.get("n_scored", 0) for figure in figures])
+            if not all(figure.get("n_scored") for figure in figures):
+                return math.inf
+            known = [figure for figure in figures if horizon in figure.get("rmse_by_horizon", {})]
+            values = [figure["rmse_by_horizon"][horizon] for figure in known]
+            return pool(values, [figure["n_scored"] for figure in known]) if known else math.inf
 
         return self._spread(at_horizon, "forecast", ())
 

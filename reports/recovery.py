@@ -18,11 +18,11 @@ FOLDER, FILE, SUMMARY, RATES = "recovery", "cases.jsonl", "summary.json", "rates
 def read(folder: Path) -> dict[str, Any]:
     """Read the confusion matrix, the stored summary and the tables of the rates; empty where there is none of them.
 
-    Raises UnusableInput for rates that `simgap recovery score` did not write.
+    Raises UnusableInput for a summary or rates that simgap did not write.
     """
     file = folder / FOLDER / FILE
     rows = [json.loads(line) for line in lines.read(file) if lines.is_json(line)] if file.is_file() else []
-    known = [row for row in rows if isinstance(row, dict) and row.get("status") == "ok"]
+    known = [row for row in rows if isinstance(row, dict) and row.get("status") == "ok" and "case" in row]
     latest = {json.dumps(row["case"], sort_keys=True): row for row in known}
     counts = dict(sorted(matrix(latest.values()).items()))
     special = [SUSPECTED, NOTHING, UNEXPLAINED]
@@ -46,7 +46,10 @@ def tables(folder: Path) -> list[Table]:
 def _summary(file: Path) -> list[tuple[str, str]]:
     if not file.is_file():
         return []
-    known = json.loads(file.read_text(encoding="utf-8"))
+    try:
+        known = json.loads(file.read_bytes())
+    except (ValueError, RecursionError):
+        raise UnusableInput(f"{file} is no JSON; `simgap run recovery` writes it") from None
     return list(known.items()) if isinstance(known, dict) else []
 
 
@@ -55,5 +58,5 @@ def _rates(file: Path) -> list[Table]:
         return []
     try:
         return rate_tables(json.loads(file.read_bytes()))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, StopIteration):
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError, StopIteration):
         raise UnusableInput(f"{file} holds no rates; `simgap recovery score --json {file}` writes them") from None

@@ -249,15 +249,16 @@ def _columns(
     columns += ["fit %", "error / best"] if compared else ["fit %"]
     if horizons:
         steps = "/".join(horizons)
-        columns += [_with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
+        columns += [with_unit(f"{output} {steps} ahead", unit) for output, unit in units.items()]
     return [*columns, "parameters", "fit s"]
 
 
 def _heading(output: str, unit: str, experiments: Sequence[str], n_groups: int) -> str:
-    return _with_unit(f"RMSE {output} {experiments[0]}" if n_groups > 1 else f"RMSE {output}", unit)
+    return with_unit(f"RMSE {output} {experiments[0]}" if n_groups > 1 else f"RMSE {output}", unit)
 
 
-def _with_unit(name: str, unit: str) -> str:
+def with_unit(name: str, unit: str) -> str:
+    """Write a name with its unit, if it has one."""
     return f"{name} [{unit}]" if unit else name
 
 

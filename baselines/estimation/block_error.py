@@ -11,7 +11,7 @@ from jaxtyping import Float
 from simgap.baselines.estimation.batches import stack
 from simgap.baselines.estimation.blocks import Blocks, Run
 from simgap.baselines.estimation.curve_kernels import basis
-from simgap.baselines.estimation.filters import divide
+from simgap.baselines.estimation.filters import delayed, divide
 from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.records import Experiment
 
@@ -87,11 +87,11 @@ class BlockError:
         model, n = self.at(theta), self.n_init
         for u, run, e in self._runs(model):
             jacobian = self._jacobian(u, run)
-            if (size := len(model.prior_weight)) > 0:
+            if len(model.prior_weight):
                 z = run.state_jacobian()  # [B, N, T]
                 inner = z[:, :, :n] @ np.swapaxes(z[:, :, :n], 1, 2) + np.diag(model.prior_weight)
                 at_start = np.einsum("bkt,pbt->bkp", z[:, :, :n], jacobian[:, :, :n])
-                move = np.linalg.solve(inner, at_start) if size else at_start  # [B, N, p]
+                move = np.linalg.solve(inner, at_start)  # [B, N, p]
                 for b in range(len(e)):
                     jacobian[:, b] -= move[b].T @ z[b]
             yield e, jacobian[:, :, n:]
@@ -110,13 +110,13 @@ class BlockError:
             for i in range(m):
                 for j in range(len(forced)):
                     parts["b1"] += [
-                        model.through(i, run.slope[i] * _delayed(forced[j], k)) for k in range(model.b1.shape[2])
+                        model.through(i, run.slope[i] * delayed(forced[j], k)) for k in range(model.b1.shape[2])
                     ]
         if "f1" in self.free and len(model.f1) > 1:
             twice = divide(run.x, model.f1)
             for k in range(1, len(model.f1)):
                 parts["f1"].append(
-                    -np.sum([model.through(i, run.slope[i] * _delayed(twice[i], k)) for i in range(m)], axis=0)
+                    -np.sum([model.through(i, run.slope[i] * delayed(twice[i], k)) for i in range(m)], axis=0)
                 )
         if "c" in self.free:
             for i in range(m):
@@ -124,10 +124,10 @@ class BlockError:
                 parts["c"] += list(model.through(i, columns.reshape(-1, batch, length)))
         if "b2" in self.free:
             filtered = divide(run.w, model.f2)
-            parts["b2"] = [_delayed(filtered[i], k) for i in range(m) for k in range(model.b2.shape[1])]
+            parts["b2"] = [delayed(filtered[i], k) for i in range(m) for k in range(model.b2.shape[1])]
         if "f2" in self.free and len(model.f2) > 1:
             twice = divide(run.y, model.f2)
-            parts["f2"] = [-_delayed(twice, k) for k in range(1, len(model.f2))]
+            parts["f2"] = [-delayed(twice, k) for k in range(1, len(model.f2))]
         return np.stack([column for name in self.free for column in parts[name]])
 
 
@@ -138,11 +138,3 @@ def _free_part(name: str, value: np.ndarray) -> np.ndarray:
 def _two(f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     choices = stable(f, radius=1.0)
     return choices[0], choices[-1]
-
-
-def _delayed(signal: np.ndarray, k: int) -> np.ndarray:
-    if k == 0:
-        return signal
-    out = np.zeros_like(signal)
-    out[..., k:] = signal[..., :-k]
-    return out

@@ -37,7 +37,7 @@ class BlockModel(ABC):
         """Choose the structure on train and valid, then estimate on both together; nothing here is random."""
         check_limits(self)
         outputs = range(len(data.channels.outputs))
-        searches = [Search(self.kind, data.train, data.valid, i, data.n_init) for i in outputs]
+        searches = [Search(self.kind, data, i) for i in outputs]
         chosen = [self._structure(data, search) for search in searches]
         self.outputs = [search.on_everything(one) for search, one in zip(searches, chosen, strict=True)]
         self._chosen = copy.copy(self)

@@ -16,7 +16,7 @@ from simgap.baselines.estimation.blocks import Blocks, Run
 from simgap.baselines.estimation.curve_kernels import basis, spline
 from simgap.baselines.estimation.filters import divide, multiply
 from simgap.baselines.estimation.levenberg import minimise
-from simgap.records import Experiment
+from simgap.records import Experiment, TrainingSet
 
 Kind = Literal["wiener", "hammerstein", "wiener-hammerstein"]
 FREE = {
@@ -37,10 +37,8 @@ class Search:
     """The records of one output, training and held out, and how a model is refined on them."""
 
     kind: Kind
-    train: Sequence[Experiment]
-    valid: Sequence[Experiment]
+    data: TrainingSet
     output: int
-    n_init: int
 
     def best(self, starts: Sequence[Blocks]) -> Blocks:
         """Choose the structure with the smallest held-out simulation error, grown from the best of the starts.
@@ -60,14 +58,14 @@ class Search:
             found = sorted([*grown, found[0]], key=lambda pair: pair[1])
         best = found[0]
         for count in FINE:
-            finer = self.refined(self._with_knots(best[0], count, excerpt(self.train, EXCERPT)), 40)
+            finer = self.refined(self._with_knots(best[0], count, excerpt(self.data.train, EXCERPT)), 40)
             best = finer if finer[1] < (1 - WORTH) * best[1] else best
         return best[0]
 
     def refined(self, start: Blocks, steps: int, records: Sequence[Experiment] | None = None) -> tuple[Blocks, float]:
         """Minimise the simulation error by Levenberg-Marquardt; the model, and its held-out RMSE."""
-        records = records or excerpt(self.train, EXCERPT)
-        equation = BlockError.of(start, records, self.output, self.n_init, FREE[self.kind])
+        records = records or excerpt(self.data.train, EXCERPT)
+        equation = BlockError.of(start, records, self.output, self.data.n_init, FREE[self.kind])
         minimum = minimise(equation, equation.theta, steps)
         noise = float(np.sqrt(minimum.cost.squares / equation.samples))
         model = replace(equation.at(minimum.theta), noise=noise)
@@ -77,15 +75,15 @@ class Search:
     def error(self, model: Blocks) -> float:
         """Compute the RMSE of the free run on held-out records, or on training records where there are none."""
         squares = samples = 0.0
-        for u, y in stack([x for x in self.valid or self.train if len(x) > self.n_init]):
-            y_hat = model.simulate(u, y[:, : self.n_init, self.output])
-            squares += float(np.sum((y_hat - y[:, self.n_init :, self.output]) ** 2))
+        for u, y in stack(self.data.held_out):
+            y_hat = model.simulate(u, y[:, : self.data.n_init, self.output])
+            squares += float(np.sum((y_hat - y[:, self.data.n_init :, self.output]) ** 2))
             samples += y_hat.size
         return float(np.sqrt(squares / samples)) if np.isfinite(squares) else np.inf
 
     def on_everything(self, model: Blocks) -> Blocks:
         """Estimate the numbers anew from all records, with knots of the same distance as far as those reach."""
-        records = [*self.train, *self.valid]
+        records = [*self.data.train, *self.data.valid]
         spans = np.ptp(self._signals(model, records), axis=1) / model.step
         count = max(int(np.ceil(spans.max())) + 3, model.c.shape[1])
         return self.refined(self._with_knots(model, count, records), FINAL, records)[0]
@@ -93,16 +91,16 @@ class Search:
     def _signals(self, model: Blocks, records: Sequence[Experiment]) -> Float[np.ndarray, "m n"]:
         """Simulate what goes into the curves."""
         parts = []
-        for u, y in stack([x for x in records if len(x) > self.n_init]):
-            deviation, start = u - model.u_mean, y[:, : self.n_init, self.output] - model.y_mean
-            run = Run.of(model, deviation, model.start_state(deviation[:, : self.n_init], start))
+        for u, y in stack([x for x in records if len(x) > self.data.n_init]):
+            deviation, start = u - model.u_mean, y[:, : self.data.n_init, self.output] - model.y_mean
+            run = Run.of(model, deviation, model.start_state(deviation[:, : self.data.n_init], start))
             parts.append(run.x.reshape(len(run.x), -1))
         return np.concatenate(parts, axis=1)
 
     def _straight(self, model: Blocks) -> Blocks:
         """Replace each curve by its line of best fit where the signals are; a spline's line stands in its c."""
         lines = []
-        for i, x in enumerate(self._signals(model, excerpt(self.train, EXCERPT))):
+        for i, x in enumerate(self._signals(model, excerpt(self.data.train, EXCERPT))):
             f, _ = spline(x, model.low[i], model.step[i], model.c[i])
             at = model.low[i] + model.step[i] * np.arange(-1, model.c.shape[1] - 1)
             lines.append(np.polyval(np.polyfit(x, f, 1), at))

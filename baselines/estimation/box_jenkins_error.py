@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from simgap.baselines.estimation.filters import divide, multiply
+from simgap.baselines.estimation.filters import delayed, divide, multiply
 from simgap.baselines.estimation.fitted import Row
 from simgap.baselines.estimation.levenberg import Cost, stable, sum_up
 from simgap.baselines.estimation.orders import Orders
@@ -91,8 +91,8 @@ class BoxJenkinsError:
         c, _ = self.noise(theta)
         for run, e, basis in self._runs(theta):
             parts = [self._whitened(self.plant.slopes(theta[: self.plant.n_params], run), theta)]
-            past_e = [-_delayed(e, k) for k in range(1, self.nc + 1)]
-            past_v = [_delayed(run.e, k)[:, self.nd :] for k in range(1, self.nd + 1)]
+            past_e = [-delayed(e, k) for k in range(1, self.nc + 1)]
+            past_v = [delayed(run.e, k)[:, self.nd :] for k in range(1, self.nd + 1)]
             if past_e or past_v:
                 parts.append(divide(np.stack([*past_e, *past_v]), c))
             jacobian = np.concatenate(parts)
@@ -113,9 +113,3 @@ class BoxJenkinsError:
         """Filter by D/C, from the first sample on that has nd before it."""
         c, d = self.noise(theta)
         return divide(multiply(d, signals)[..., self.nd :], c)
-
-
-def _delayed(signal: np.ndarray, k: int) -> np.ndarray:
-    out = np.zeros_like(signal)
-    out[:, k:] = signal[:, :-k]
-    return out

@@ -14,6 +14,15 @@ def multiply(b: np.ndarray | Sequence[float], signal: np.ndarray, axis: int = -1
     return np.asarray(lfilter(b, [1.0, 0.0], signal, axis=axis))
 
 
+def delayed(signal: np.ndarray, k: int) -> np.ndarray:
+    """Compute q^-k x along the last axis: x(t-k), 0 before the record."""
+    if k == 0:
+        return signal
+    out = np.zeros_like(signal)
+    out[..., k:] = signal[..., :-k]
+    return out
+
+
 def divide(signal: np.ndarray, f: np.ndarray | Sequence[float], axis: int = -1) -> np.ndarray:
     """Compute x / F(q) with F monic: y(t) = x(t) - sum_k f_k y(t-k)."""
     if len(f) == 1:  # SciPy would convolve row by row in Python

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -35,7 +36,7 @@ class Job:
         """Carry out the order in `folder` and give its last report; whatever goes wrong there is a refusal."""
         try:
             last = await self._run()
-        except (OSError, msgspec.MsgspecError) as error:  # no memory for a process, or its folder was deleted
+        except OSError as error:  # no memory for a process, or its folder was deleted
             last = Report(refused=f"It could not be started: {error}")
         self.ended = self.ended or last
         return self.ended
@@ -53,7 +54,8 @@ class Job:
         self.process.stdin.close()
         last = Report()
         async for line in self.process.stdout:
-            last = msgspec.json.decode(line, type=Report)
+            with suppress(msgspec.MsgspecError):  # it was killed while it wrote the line; its exit code says so
+                last = msgspec.json.decode(line, type=Report)
             if last.stage:
                 self.stages.append((self.seconds, last.stage))
         code = await self.process.wait()

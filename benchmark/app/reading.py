@@ -17,9 +17,9 @@ from simgap.data.formats.one_record import Choices
 from simgap.data.formats.plant_table import parse_known, with_known
 from simgap.data.formats.sampling import sampling_time
 from simgap.data.formats.tables import Table, missing_in
-from simgap.data.kinds import kind_of, with_kinds
+from simgap.data.kinds import KINDS, kind_of, with_kinds
 from simgap.data.loading import Reading, read, read_tables
-from simgap.records import Channel, Channels, Dataset, UnusableInput
+from simgap.records import Channel, Dataset, UnusableInput
 from simgap.registry import DATASETS
 from simgap.reports.diagnosis.traces import thin
 
@@ -35,10 +35,10 @@ def look(source: str) -> Look:
     return _of_logs(read_tables(source, Choices()))
 
 
-def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: Mapping[str, str]) -> Settings:
+def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: str | Mapping[str, str] | None) -> Settings:
     """Put headings for the names of columns, with or without the unit; what is not told is what the headings suggest.
 
-    Raises UnusableInput for an unknown column.
+    One kind is that of every output. Raises UnusableInput for an unknown column or kind.
     """
     headings = [column.heading for column in seen.columns]
 
@@ -51,7 +51,12 @@ def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: Mappi
     named = {"input": list(map(heading, inputs)), "output": list(map(heading, outputs))}
     rest = [column for column in seen.columns if column.heading not in (*named["input"], *named["output"])]
     role = {of: said or [column.heading for column in rest if column.role == of] for of, said in named.items()}
-    return Settings(role["input"], role["output"], kinds={heading(name): kind for name, kind in kinds.items()})
+    if isinstance(kinds, str) and not role["output"]:
+        raise UnusableInput(f"--kind {kinds}: name the output, with --output")
+    of_outputs = dict.fromkeys(role["output"], kinds) if isinstance(kinds, str) else kinds or {}
+    if unknown := sorted(set(of_outputs.values()) - set(KINDS)):
+        raise UnusableInput(f"kind {unknown[0]!r}: use one of {', '.join(KINDS)}")
+    return Settings(role["input"], role["output"], kinds={heading(name): kind for name, kind in of_outputs.items()})
 
 
 def dataset_of(source: str, settings: Settings) -> Reading:
@@ -64,7 +69,7 @@ def dataset_of(source: str, settings: Settings) -> Reading:
     theirs = reading.simulated
     if theirs is not None:
         outputs = dataset.channels.outputs
-        theirs = _with_channels(theirs, replace(theirs.channels, outputs=outputs))
+        theirs = theirs.with_channels(replace(theirs.channels, outputs=outputs))
     return Reading(with_known(dataset, parse_known(settings.known)), reading.said, theirs)
 
 
@@ -82,7 +87,7 @@ def with_units(dataset: Dataset, units: Mapping[str, str]) -> Dataset:
             raise UnusableInput(f"{dataset.name}: unit of {column!r}: there are the columns {listed(names)}")
         every[found[0]] = _in_unit(every[found[0]], unit.strip(), is_output=found[0] >= len(channels.inputs))
     nu = len(channels.inputs)
-    return _with_channels(dataset, replace(channels, inputs=tuple(every[:nu]), outputs=tuple(every[nu:])))
+    return dataset.with_channels(replace(channels, inputs=tuple(every[:nu]), outputs=tuple(every[nu:])))
 
 
 def _in_unit(channel: Channel, unit: str, is_output: bool) -> Channel:
@@ -92,10 +97,6 @@ def _in_unit(channel: Channel, unit: str, is_output: bool) -> Channel:
         return replace(channel, unit=unit)
     kind = kind_of(channel.name, unit)
     return Channel(channel.name, unit, kind, "header") if kind else Channel(channel.name, unit)
-
-
-def _with_channels(dataset: Dataset, channels: Channels) -> Dataset:
-    return replace(dataset, training=replace(dataset.training, channels=channels), channels=channels)
 
 
 def _of_dataset(dataset: Dataset) -> Look:

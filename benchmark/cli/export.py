@@ -65,12 +65,18 @@ def export(
         exports.check_target(to, out, into)  # first, because a fit takes its time
         params: dict[str, Any] = {}
         records: Any = data
-        if not exports.is_saved(model):
+        if exports.is_saved(model):
+            given = {"input": inputs, "output": outputs, "kind": kind, "param": param, "seed": seed}
+            if said := [name for name, value in given.items() if value]:
+                raise UnusableInput(f"--{said[0]}: {model} is a saved model, which is not fitted again; leave it out")
+        else:
             exports.check_model(model, to)
             records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps).dataset
             params = parse_params(param or ())
         with model_faults("export"):
-            done = exports.export(model, records, to, out, params, seed, experiment, dt, table, into, joint)
+            done = exports.export(
+                model, records, to, out, params, seed, experiment, dt, table, into, joint, resample, split_gaps
+            )
     typer.echo(printable(str(done)))
     if not done.passed:
         raise typer.Exit(1)

@@ -38,11 +38,8 @@ def open_page(
     said = None
     if data:
         seen = look(data)  # what cannot be read is refused here
-        kinds = parse_kinds(kind or ())
-        if isinstance(kinds, str):
-            kinds = dict.fromkeys(outputs or (), kinds)
-        if inputs or outputs or dt or kind:
-            said = replace(told(seen, inputs or (), outputs or (), kinds or {}), dt=dt)
+        if inputs or outputs or dt is not None or kind:
+            said = replace(told(seen, inputs or (), outputs or (), parse_kinds(kind or ())), dt=dt)
     try:
         server = Server(port, data, said)
     except OSError as error:

@@ -90,6 +90,8 @@ def answer(
         answers = recovery.answer(folder, out, tool, execution).answers
     failed = sum(bool(said.failed) for said in answers.values())
     typer.echo(f"{len(answers)} answers of {tool} are in {out}; {failed} say that it failed")
+    if failed:
+        raise typer.Exit(1)
 
 
 @app.command(short_help="Count right and invented names.")

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simgap.cli.options import Inputs, Json, Outputs, Resample, SamplingTime, SplitGaps, names, write_json
+from simgap.cli.options import (
+    Inputs,
+    Json,
+    Outputs,
+    Resample,
+    SamplingTime,
+    SplitGaps,
+    check_writable,
+    names,
+    write_json,
+)
 from simgap.cli.progress import shown
 from simgap.records import UnusableInput
 
@@ -41,6 +51,7 @@ def run(
     """
     from simgap.running.suites import STUDY
 
+    check_writable(json)
     if suite == STUDY:
         from simgap.cli import recovery
 

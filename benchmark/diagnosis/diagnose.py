@@ -91,7 +91,7 @@ def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> D
     training = dataset.training
     controller = doubts.shows_controller((*training.train, *training.valid), dataset.channels)
     identified = identify(training, effects=controller is None)
-    dataset = unsaid_kinds.with_channels(dataset, channels_of(identified, training))
+    dataset = dataset.with_channels(channels_of(identified, training))
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     stage("Weighing the evidence")

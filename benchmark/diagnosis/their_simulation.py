@@ -11,7 +11,6 @@ import numpy as np
 from simgap.diagnosis import gains
 from simgap.diagnosis.answer import Diagnosis
 from simgap.diagnosis.side_by_side import SideBySide
-from simgap.diagnosis.unsaid_kinds import with_channels
 from simgap.diagnosis.wrong import wrong
 from simgap.findings import Budget, Cause, Findings, Value, Verdict
 from simgap.greybox.linear_names import linear_names
@@ -32,7 +31,7 @@ def judge(answer: Diagnosis, dataset: Dataset, simulated: Dataset, seed: int, vi
     this does without is missing there, and numbers beyond the machine's 95 % intervals are wrong there.
     """
     found, n = answer.findings, dataset.n_init
-    simulated = with_channels(simulated, _with_kinds(dataset.channels, found))
+    simulated = simulated.with_channels(_with_kinds(dataset.channels, found))
     before = [z.y[n:] for z in simulated.test]
     after = [answer.model.simulate_anew(x, n) for x in dataset.test]
     trusted = found.verdict != "unexplained" and not found.doubts

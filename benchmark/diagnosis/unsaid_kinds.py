@@ -8,14 +8,9 @@ from shlex import quote
 
 from simgap.findings import Cause, Separation
 from simgap.greybox.identification import Identified
-from simgap.records import Channel, Channels, Dataset, Kind
+from simgap.records import Channel, Channels, Kind
 
 CALLED = {"position": "a position", "velocity": "a velocity", "level": "a level", "other": "anything else"}
-
-
-def with_channels(dataset: Dataset, channels: Channels) -> Dataset:
-    """Return the same data set with other words about its columns."""
-    return replace(dataset, training=replace(dataset.training, channels=channels), channels=channels)
 
 
 def taken_for(identified: Sequence[Identified], channels: Channels) -> tuple[str, ...]:

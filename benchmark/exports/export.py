@@ -46,7 +46,7 @@ class Verification:
 def export(
     model: str | Path | SavedModel, data: Any, to: str, out: str | Path, params: dict[str, Any] | None = None,
     seed: int = 0, experiment: str | None = None, dt: float | None = None, known: Mapping[str, Any] | None = None,
-    into: str | Path | None = None, joint: str = "",
+    into: str | Path | None = None, joint: str = "", resample: float | None = None, split_gaps: bool = False,
 ) -> Verification:  # fmt: skip
     """Write a model as another simulator reads it, into a new folder, with records and their expected answers; run it.
 
@@ -54,11 +54,11 @@ def export(
     same machine; `known` what is known of it, as a table [plant] says it: a model that is fitted first is fitted with
     it, a saved one takes its inertia from there, or from a torque constant; `into` the user's own MJCF, into a copy of
     which mjcf writes the joint of that name too. The record is the first test experiment, or the one called
-    `experiment`; dt in s, for files without a column of time. Raises UnusableInput where the format does not take such
-    a model, or what runs it is missing.
+    `experiment`; dt in s, for files without a column of time; `resample` and `split_gaps` are those of `simgap.load`.
+    Raises UnusableInput where the format does not take such a model, or what runs it is missing.
     """
     target, out = check_target(to, out, into), Path(out)
-    subject = _subject(model, data, to, params or {}, seed, experiment, dt, dict(known or {}))
+    subject = _subject(model, data, to, params or {}, seed, experiment, (dt, resample, split_gaps), dict(known or {}))
     if hasattr(target, "prepare"):
         subject = target.prepare(subject)
     limit = target.check(subject) if hasattr(target, "check") else subject.limit
@@ -122,7 +122,7 @@ def _format(name: str) -> Any:
 
 def _subject(
     model: str | Path | SavedModel, data: Any, to: str, params: dict[str, Any], seed: int,
-    experiment: str | None, dt: float | None, known: dict[str, Any],
+    experiment: str | None, reading: tuple[float | None, float | None, bool], known: dict[str, Any],
 ) -> Subject:  # fmt: skip
     if isinstance(model, SavedModel) or is_saved(model):
         saved = model if isinstance(model, SavedModel) else read_saved(model)
@@ -135,11 +135,14 @@ def _subject(
         if isinstance(data, Dataset):
             x, seen = _record(data, experiment), data.training.train + data.training.valid + data.test
         else:
-            x, seen = matching_experiments(about, data, experiment, dt)[0], matching_experiments(about, data, dt=dt)
+            x = matching_experiments(about, data, experiment, *reading)[0]
+            seen = matching_experiments(about, data, None, *reading)
     else:
         check_model(str(model), to)  # first, because data and a fit take their time
         torque_constant = {key: known.pop(key) for key in ("torque_constant",) if key in known}
-        dataset = with_known(data if isinstance(data, Dataset) else load(data, dt=dt), known)
+        dt, resample, split_gaps = reading
+        dataset = data if isinstance(data, Dataset) else load(data, dt=dt, resample=resample, split_gaps=split_gaps)
+        dataset = with_known(dataset, known)
         forces = read_forces(torque_constant)
         name, about = str(model).rpartition(":")[2], FittedOn.of(dataset)
         fitted = fitting.build(str(model), params)

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from simgap.metrics import failed_metrics, free_run_nrmse
 from simgap.protocol import Model, as_chosen, earlier_seconds, is_stochastic
 from simgap.records import Dataset, Result, TrainingSet, UnusableInput
-from simgap.registry import MODELS, load_class
+from simgap.registry import MODELS, file_of, load_class
 from simgap.results.store import plain
 from simgap.running.annotations import fits, hints_of, in_words
 from simgap.running.provenance import provenance
@@ -73,7 +73,7 @@ def fit(
 
 def model_class(reference: str) -> type:
     """Find the class of a registered name, of `file.py:Class`, or of a `file.py` with one. Raises UnusableInput."""
-    kind = load_class(reference) if ".py:" in reference or reference.endswith(".py") else MODELS[reference]
+    kind = load_class(reference) if file_of(reference) else MODELS[reference]
     for method in ("fit", "simulate"):
         if not callable(getattr(kind, method, None)):
             raise UnusableInput(f"{reference} is no model: it has no method {method}")
@@ -140,7 +140,8 @@ def score_model(
     for experiment in dataset.test:
         simulate = CheckedSimulation(model, len(dataset.channels.outputs))
         evaluation = Evaluation(simulate, experiment, dataset.n_init, dataset.channels)
-        results += [_score(evaluation, simulate, task, about) for task in tasks]
+        first = sorted(tasks, key=lambda task: task.name != "free_run")  # its row says how long the free run took
+        results += [_score(evaluation, simulate, task, about) for task in first]
         if "free_run" in vars(evaluation):  # cached, unless no task asked for it or it was not possible
             runs[experiment.name] = evaluation.free_run
     units = {channel.name: channel.unit for channel in dataset.channels.outputs}

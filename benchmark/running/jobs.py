@@ -16,7 +16,7 @@ import numpy as np
 from simgap.metrics import failed_metrics
 from simgap.protocol import Model, is_stochastic
 from simgap.records import Channels, Dataset, Result, Status
-from simgap.registry import MODELS
+from simgap.registry import MODELS, file_of
 from simgap.results import artefacts
 from simgap.results.artefacts import Artefact
 from simgap.results.store import plain
@@ -119,7 +119,7 @@ class Job:
     def execute(self) -> list[Result]:
         """Fit and score. Whatever the model does short of ending the process becomes rows."""
         try:
-            dataset = _load(self.arguments, self.card.sha256)
+            dataset = _load(self.arguments, self.card)
         except Exception as error:  # the file may have changed since the parent read it
             return self.failed("error", f"the data set could not be loaded again: {error}")
         if dataset.sha256 != self.card.sha256:
@@ -153,8 +153,9 @@ class Job:
 
     def portable(self) -> Job:
         """The same job with absolute paths."""
-        file, colon, name = self.entry.name.rpartition(":")
-        entry = replace(self.entry, name=f"{Path(file).absolute()}:{name}") if colon else self.entry
+        entry, file = self.entry, file_of(self.entry.name)
+        if file:
+            entry = replace(entry, name=f"{Path(file).absolute()}{entry.name.removeprefix(file)}")
         arguments = replace(self.arguments, data=_absolute(self.arguments.data))
         artefact = None if self.artefact is None else self.artefact.absolute()
         return replace(self, entry=entry, arguments=arguments, artefact=artefact)
@@ -164,12 +165,12 @@ class Job:
         return model_code(self.entry).sha256() == self.provenance["model_sha256"]
 
 
-def _load(arguments: LoadArguments, sha256: str) -> Dataset:
+def _load(arguments: LoadArguments, card: Card) -> Dataset:
     """The data, which may take seconds to make: the first job of a run leaves them for the others."""
     folder = shared_folder()
     if folder is None:
         return arguments.load()
-    file = Path(folder) / f"{sha256}.data"
+    file = Path(folder) / f"{card.name}-{card.sha256}.data"  # the same samples may have another name, or other units
     if not file.exists():
         dataset = arguments.load()
         partial = file.with_suffix(f".{os.getpid()}")

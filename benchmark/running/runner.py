@@ -41,10 +41,12 @@ def run(
     `engine` is a registered one: "ray" hands them to the Ray cluster at `address` instead. What is stored for the same
     data and code is not computed again. Raises UnusableInput.
     """
-    files = planning.load_arguments(_listed(datasets), _listed(inputs), _listed(outputs), dt, resample, split_gaps)
-    choice = Choice(tuple(_listed(models)), tuple(_listed(model)), tuple(files))
+    wanted = planning.with_seeds(load_suite(suite), seeds)
+    reading = _listed(inputs), _listed(outputs), dt, resample, split_gaps
+    named = _listed(datasets) or (wanted.datasets if any(reading) else ())
+    choice = Choice(tuple(_listed(models)), tuple(_listed(model)), tuple(planning.load_arguments(named, *reading)))
     execution = Execution(engine, jobs, {"address": address}, Path(out), progress or log_messages)
-    return run_suite(planning.with_seeds(load_suite(suite), seeds), choice, execution)
+    return run_suite(wanted, choice, execution)
 
 
 def run_suite(suite: Suite, choice: Choice, execution: Execution) -> list[Result]:

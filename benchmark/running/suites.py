@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from simgap.records import UnusableInput
-from simgap.registry import DATASETS, MODELS, Registry
+from simgap.registry import DATASETS, MODELS, Registry, file_of
 from simgap.tasks import TASKS, USUAL
 
 FOLDER = Path(__file__).parent / "suites"
@@ -94,8 +95,8 @@ class _Reader:
         for task in suite.tasks:
             if task not in TASKS:
                 raise UnusableInput(f"{self.path}: there is no task {task!r}; known are {', '.join(TASKS)}")
-        if suite.seeds < 1 or not suite.timeout > 0 or not suite.memory > 0:
-            raise UnusableInput(f"{self.path}: seeds, timeout and memory must be positive")
+        if suite.seeds < 1 or not suite.timeout > 0 or not 0 < suite.memory < math.inf:
+            raise UnusableInput(f"{self.path}: seeds, timeout and memory must be positive, and memory finite")
         return suite
 
     def _datasets(self) -> tuple[str, ...]:
@@ -126,8 +127,10 @@ class _Reader:
             if entry[0] == "all":
                 usual = {name: Entry(name) for name in MODELS if name not in without}
             else:
-                name = self._near(entry[0]) if ".py:" in entry[0] else entry[0]
+                name = self._near(entry[0]) if file_of(entry[0]) else entry[0]
                 chosen.append(Entry(name, *entry[1:], gpus=self._gpus(table)))
+        if "without_models" in self.table and not usual:
+            raise UnusableInput(f'{self.path}: without_models goes with the model "all" only')
         labels = {entry.label for entry in chosen}
         return [*(entry for label, entry in usual.items() if label not in labels), *chosen]
 
@@ -178,7 +181,7 @@ class _Reader:
     def _near(self, name: str) -> str:
         """`name`, a path or `file.py:Class`, from the suite's own folder if there is such a file."""
         near = self.path.parent / name
-        file = Path(str(near).rpartition(":")[0]) if ".py:" in name else near
+        file = Path(file_of(str(near)) or near)
         try:
             return str(near) if file.exists() else name
         except (OSError, ValueError):  # a name that no file can have

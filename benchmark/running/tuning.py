@@ -84,13 +84,19 @@ class Tuned:
         """Write the best settings as a suite for `simgap run`; `data` is the data set as the suite names it."""
         found = f"{100 * self.trials[0].error:.3g} -> {100 * self.best.error:.3g} percent of the spread"
         spent = f"{len(self.trials)} settings, {self.budget:g} s, seed {self.seed}"
-        params = ", ".join(f"{name} = {json.dumps(plain(value))}" for name, value in self.best.params.items())
         return (
             f"# Chosen on validation data: {found}; {spent}.\n"
             f"title = {json.dumps(f'{self.model}, tuned on {self.dataset}')}\ndatasets = {json.dumps([data])}\n\n"
             f"[[models]]\nname = {json.dumps(self.model)}\nlabel = {json.dumps(f'{self.model} tuned')}\n"
-            f"params = {{ {params} }}\n"
+            f"params = {_toml(plain(self.best.params))}\n"
         )
+
+
+def _toml(value: Any) -> str:
+    """Write a value of JSON as TOML, which has its tables in one line."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{name} = {_toml(one)}' for name, one in value.items())} }}"
+    return json.dumps(value)
 
 
 def tune(

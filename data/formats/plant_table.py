@@ -140,7 +140,7 @@ def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
     channels = replace(dataset.channels, plant=plant)
     training = dataset.training
     check_records(plant, (*training.train, *training.valid, *dataset.test), channels, dataset.name, AS_OPTION)
-    return replace(dataset, training=replace(training, channels=channels), channels=channels)
+    return dataset.with_channels(channels)
 
 
 def read_forces(table: Mapping[str, Any], where: str = "--known") -> dict[str, float]:

@@ -195,12 +195,20 @@ def _plateau(history: History, recipe: Recipe) -> bool:
 
 
 def range_test(
-    net: Block, examples: Examples, batch: int, low: float = 1e-8, high: float = 1.0, steps: int = 400, seed: int = 0
+    net: Block,
+    examples: Examples,
+    batch: int,
+    low: float = 1e-8,
+    high: float = 1.0,
+    steps: int = 400,
+    seed: int = 0,
+    device: str = "cpu",
 ) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"]]:
     """Give rates and losses while the learning rate grows from batch to batch (paper, 3.4; Smith 2017).
 
     Ends early when the loss is ten times the lowest one.
     """
+    net.to(device)
     adam = optimiser(net, Recipe(1, batch, low, 1, 1))
     order = torch.Generator().manual_seed(seed)
     rates, losses = torch.logspace(math.log10(low), math.log10(high), steps), []
@@ -208,7 +216,8 @@ def range_test(
     for rate in rates:
         for group in adam.param_groups:
             group["lr"] = float(rate)
-        x, y = examples.batch(torch.randint(len(examples), (batch,), generator=order))
+        chosen = torch.randint(len(examples), (batch,), generator=order)
+        x, y = (part.to(device) for part in examples.batch(chosen))
         adam.zero_grad()
         loss = nn.functional.mse_loss(examples.answer(net, x), y)
         loss.backward()

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from simgap.neural.training import checkpoints, graph, sequences, stepping, weights, windows
 from simgap.neural.training.blocks import Block
 from simgap.neural.training.examples import Examples
-from simgap.neural.training.loop import DECAYED, History, Recipe, figures, range_test, train
+from simgap.neural.training.loop import DECAYED, History, NotANumber, Recipe, figures, range_test, train
 from simgap.neural.training.scaling import Scaling, features, scalings
 from simgap.neural.training.threads import one_thread
 from simgap.protocol import progress
@@ -97,7 +97,12 @@ class Network(ABC):
 
         with torch.random.fork_rng(devices=[]), one_thread():
             torch.manual_seed(seed)
-            history = train(net, examples, held_out, recipe, seed, self.device, checkpoint, tell)
+            try:
+                history = train(net, examples, held_out, recipe, seed, self.device, checkpoint, tell)
+            except NotANumber:  # and would be again from there
+                if checkpoint is not None:
+                    checkpoints.remove(checkpoint)
+                raise
             scores = figures(net, examples), figures(net, held_out)
             reach = {"reach": windows.reach(net, held_out)} if isinstance(held_out, windows.Windows) else {}
         self.trained, self.earlier_seconds = net, history.earlier
@@ -115,7 +120,7 @@ class Network(ABC):
         self.dt = data.dt
         nu, ny = len(data.channels.inputs), len(data.channels.outputs)
         self.of_x, self.of_y = scalings(data.train, time=self.windowed)
-        valid = data.valid or data.train
+        valid = data.held_out
         examples: Examples
         held_out: Examples
         if self.windowed:
@@ -162,8 +167,9 @@ class Network(ABC):
     def range_test(self, data: TrainingSet, seed: int) -> tuple[np.ndarray, np.ndarray]:
         """Give learning rates and the losses while the rate grows from batch to batch (paper, 3.4)."""
         examples, _, net = self.prepare(data, seed)
-        with one_thread():
-            rates, losses = range_test(net, examples, self.recipe.batch, seed=seed)
+        with torch.random.fork_rng(devices=[]), one_thread():
+            torch.manual_seed(seed)
+            rates, losses = range_test(net, examples, self.recipe.batch, seed=seed, device=self.device)
         return rates.numpy().astype(float), losses.numpy().astype(float)
 
     @property
@@ -222,7 +228,9 @@ class Network(ABC):
         folder = os.environ.get("SIMGAP_CHECKPOINTS")
         if not folder:
             return None
-        digest = hashlib.sha256(repr((type(self).__qualname__, self.hyper_parameters(), seed, data.n_init)).encode())
+        lengths = [len(x) for x in data.train], [len(x) for x in data.valid]
+        about = type(self).__qualname__, self.hyper_parameters(), seed, data.n_init, data.dt, lengths
+        digest = hashlib.sha256(repr(about).encode())
         for x in data.train + data.valid:
             digest.update(x.u.tobytes() + x.y.tobytes())
         return Path(folder) / f"{digest.hexdigest()[:24]}.safetensors"

@@ -59,7 +59,7 @@ def axis_range(y: Float[np.ndarray, " N"], simulated: Sequence[Float[np.ndarray,
         return None
     low, high = float(finite.min()), float(finite.max())
     span = high - low or abs(high) or 1.0
-    others = np.concatenate([other[np.isfinite(other)] for other in simulated])
+    others = np.concatenate([y[:0], *(other[np.isfinite(other)] for other in simulated)])
     if len(others):
         others = np.clip(others, low - span, high + span)
         low, high = min(low, float(others.min())), max(high, float(others.max()))

@@ -31,7 +31,7 @@ def _horizon(standing: Standing, output: str, unit: str) -> Chart | None:
         traces += [line(steps, [getattr(s, end) for s in spreads], f"{word} seed", role="bound")
                    for end, word in (("low", "best"), ("high", "worst"))]  # fmt: skip
     words = f"{spreads[0].median:.3g} {unit} one sample ahead, {spreads[-1].median:.3g} {unit} {steps[-1]} ahead"
-    free = standing.rmse_at(output, "all")
+    free = standing.rmse(output, ())
     if free is not None and math.isfinite(free.median):
         ends = [float(steps[0]), float(steps[-1])]
         traces.append(line(ends, [free.median] * 2, "free run", role="bound", dash="dot"))

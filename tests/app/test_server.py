@@ -184,6 +184,12 @@ def test_what_cannot_be_opened_is_refused_in_a_sentence(tmp_path):
     write_cart(tmp_path / "cart.csv", samples=60)
     done = simgap("open", "cart.csv", "--input", "torque", "--no-browser", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "") and "'force'" in done.stderr
+    for said, why in (
+        (("--kind", "velocity"), "name the output, with --output"),
+        (("--output", "v", "--kind", "speed"), "kind 'speed': use one of position, velocity"),
+    ):
+        done = simgap("open", "cart.csv", *said, "--no-browser", cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (2, "") and why in done.stderr
     done = simgap("open", "missing.csv", "--no-browser", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert "missing.csv" in done.stderr

@@ -31,7 +31,8 @@ def test_the_version_is_printed(capsys):
     [
         "nosuch", "--nosuch", "run --nosuch", "run --jobs many", "run --jobs 0", "run nosuch",
         "run --engine ray", "run --models nosuch", "run --model nosuch.py:A", "run --model nosuch",
-        "run --datasets nosuch", "list", "list nosuch", "fit", "fit nosuch gimbal", "fit mean",
+        "run --datasets nosuch", "run --json nosuch/rows.json", "list", "list nosuch", "fit",
+        "fit nosuch gimbal", "fit mean",
         "fit mean nosuch", "fit mean gimbal --param na", "fit mean gimbal --param =3", "report nosuch",
         "data", "data nosuch", "data make", "data make nosuch", "data fetch nosuch", "data check nosuch",
     ],

@@ -278,3 +278,10 @@ def test_a_measured_set_may_start_from_fewer_samples_as_older_publications_did(m
     assert early.name == "ced-n_init4"
     assert (usual.n_init, early.n_init, early.training.n_init) == (10, 4, 4)
     assert all(np.array_equal(a.y, b.y) for a, b in zip(usual.test, early.test, strict=True))
+
+
+@pytest.mark.parametrize("name", ["ced", "cascaded_tanks"])
+def test_another_start_is_another_data_set_to_all_who_tell_them_apart_by_their_digest(name):
+    if available()[name]:
+        pytest.skip(f"{name} is not at hand")
+    assert load(name).sha256 != load(f"{name}-n_init4").sha256

@@ -84,6 +84,7 @@ def test_an_export_that_answers_otherwise_is_found(saved, capsys):
         (["mean", "stage", "--to", "onnx", "--out", "new"], "it can be to"),
         (["no_model", "stage", "--to", "c", "--out", "new"], "there is no model"),
         (["stage.simgap", "stage", "--to", "c", "--out", "new", "--experiment", "e99"], "no experiment 'e99'"),
+        (["stage.simgap", "stage", "--to", "c", "--out", "new", "--param", "na=3"], "--param: stage.simgap is a saved"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(saved, arguments, sentence, monkeypatch, capsys):

@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -157,3 +158,23 @@ def test_a_log_for_tensorboard_is_written(tmp_path, data):
     pytest.importorskip("tensorboard")
     small(epochs=1, log=str(tmp_path)).fit(data, 0)
     assert list(tmp_path.glob("events.out.tfevents.*"))
+
+
+def test_a_checkpoint_is_that_of_one_division_into_training_and_validation(tmp_path, monkeypatch, data):
+    monkeypatch.setenv("SIMGAP_CHECKPOINTS", str(tmp_path))
+    moved = replace(data, train=data.train[:-1], valid=(data.train[-1], *data.valid))
+    assert small()._checkpoint(data, 0) != small()._checkpoint(moved, 0)
+
+
+def test_a_training_that_ended_in_no_number_leaves_no_checkpoint(tmp_path, monkeypatch, data):
+    monkeypatch.setenv("SIMGAP_CHECKPOINTS", str(tmp_path))
+    losses = iter([0.5, float("nan")])
+    monkeypatch.setattr(loop, "error", lambda *_: next(losses))
+    with pytest.raises(NotANumber, match="after epoch 2"):
+        small().fit(data, 0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_same_seed_gives_the_same_range_test_in_spite_of_dropout(data):
+    losses = [small(InceptionRegularised).range_test(data, 3)[1] for _ in range(2)]
+    np.testing.assert_array_equal(*losses)

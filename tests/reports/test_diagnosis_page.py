@@ -158,6 +158,7 @@ def test_a_simulation_that_diverges_leaves_the_measurement_readable(named):
     page = Page(diagnosis_page(replace(named, traces=(replace(first, before=huge),))))
     assert len(page.plots) == 1 + 1 + 1 + 2
     assert axis_range(first.y[:, 0], [huge[:, 0]])[1] < 10 * np.abs(first.y).max()
+    assert axis_range(first.y[:, 0], []) is not None
 
 
 def test_a_page_without_experiments_and_views_is_whole(nothing_found):

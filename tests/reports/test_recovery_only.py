@@ -41,3 +41,11 @@ def test_damaged_rates_are_refused(folder):
         (folder / "recovery" / "rates.json").write_text(text)
         with pytest.raises(UnusableInput, match="holds no rates"):
             simgap.report(folder)
+
+
+def test_a_torn_summary_is_refused_and_a_row_without_its_case_is_none(folder):
+    (folder / "recovery" / "cases.jsonl").write_text('{"status": "ok"}\n')
+    simgap.report(folder)
+    (folder / "recovery" / "summary.json").write_text('{"a')
+    with pytest.raises(UnusableInput, match=r"summary\.json is no JSON"):
+        simgap.report(folder)

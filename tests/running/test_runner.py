@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -272,3 +273,23 @@ def test_data_reach_a_worker_as_they_are_and_read_only(dataset):
     assert again.sha256 == dataset.sha256 == again._digest()
     for experiment in (*again.training.train, *again.training.valid, *again.test):
         assert not (experiment.u.flags.writeable or experiment.y.flags.writeable)
+
+
+def test_two_data_sets_of_the_same_samples_are_each_scored_as_what_they_are(tmp_path, dataset, example):
+    for name, unit in (("one", "deg"), ("other", "rad")):
+        outputs = (replace(dataset.channels.outputs[0], unit=unit), dataset.channels.outputs[1])
+        data = replace(dataset, name=name).with_channels(replace(dataset.channels, outputs=outputs))
+        save(data, tmp_path / name)
+    rows = simgap.run(
+        model=[example("Mean")], datasets=[str(tmp_path / "one"), str(tmp_path / "other")], out=tmp_path / "out"
+    )
+    assert len({row.provenance["data_sha256"] for row in rows}) == 1
+    assert {(row.dataset, row.units["phi"]) for row in rows} == {("one", "deg"), ("other", "rad")}
+
+
+def test_columns_are_named_for_the_files_of_a_suite_too(tmp_path, example):
+    lines = ["t,u,y"] + [f"{i / 10},{(i * 7) % 5},{(i * 3) % 4}" for i in range(200)]
+    (tmp_path / "mine.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "mine.toml").write_text(f'datasets = ["mine.csv"]\n[[models]]\nname = "{example("Mean")}"\n')
+    rows = simgap.run(str(tmp_path / "mine.toml"), inputs=["u"], outputs=["y"], out=tmp_path / "out")
+    assert {(row.dataset, row.status) for row in rows} == {("mine", "ok")}

@@ -118,10 +118,10 @@ def test_all_models_and_one_more_fit_in_one_suite(tmp_path):
 def test_paths_in_a_suite_count_from_its_file(tmp_path):
     (tmp_path / "my_data").mkdir()
     (tmp_path / "my_model.py").touch()
-    text = 'datasets = ["my_data"]\n[[models]]\nname = "my_model.py:Mine"\n'
+    text = 'datasets = ["my_data"]\n[[models]]\nname = "my_model.py:Mine"\n[[models]]\nname = "my_model.py"\n'
     suite = load_suite(written(tmp_path, text))
     assert suite.datasets == (str(tmp_path / "my_data"),)
-    assert suite.models == (Entry(f"{tmp_path / 'my_model.py'}:Mine", {}, "Mine"),)
+    assert [entry.name for entry in suite.models] == [f"{tmp_path / 'my_model.py'}:Mine", f"{tmp_path / 'my_model.py'}"]
 
 
 @pytest.mark.parametrize(
@@ -133,6 +133,8 @@ def test_paths_in_a_suite_count_from_its_file(tmp_path):
         ("seeds = true", "seeds is True"),
         ("seeds = 0", "must be positive"),
         ("timeout = nan", "must be positive"),
+        ("memory = inf", "memory finite"),
+        ('without_models = ["arx"]\n[[models]]\nname = "oe"', 'without_models goes with the model "all" only'),
         ('tasks = ["predict"]', "no task 'predict'"),
         ("tasks = []", "tasks is empty"),
         ("tasks = [1]", "no task '1'"),

@@ -118,3 +118,9 @@ def test_without_validation_data_there_is_nothing_to_tune_by(dataset):
     training = replace(dataset.training, valid=())
     with pytest.raises(UnusableInput, match="has no validation data"):
         tune("arx", replace(dataset, training=training, sha256="0" * 64), ORDERS, seconds=1.0)
+
+
+def test_a_table_among_the_settings_is_written_as_one(dataset):
+    order = {"na": 2, "nb": 2, "nk": 1}
+    tuned = tune("delta", dataset, [Range("model", choices=("arx",))], seconds=1.0, params={"params": order})
+    assert tomllib.loads(tuned.to_suite("mine"))["models"][0]["params"]["params"] == order

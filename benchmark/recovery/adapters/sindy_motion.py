@@ -111,7 +111,7 @@ def free_run_errors(
     def rate(z: np.ndarray, k: int, t: float) -> np.ndarray:
         columns = library.columns(z[0], z[1], u[k], np.asarray(t))
         total = driven[k] + sum(own[:, [i]] * column for i, (_, column) in enumerate(columns))
-        # Of a body without a position, and of an equation of first order, the other state stays where it is.
+        # Of an equation of first order the other state stays where it is; of a body without a position nobody reads it.
         return np.stack([z[1] if second else total, total if second else 0 * total])
 
     for k in range(first, len(y)):
