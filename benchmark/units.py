@@ -21,6 +21,7 @@ TIMES = {
     "ms": (1, 10**3), "msec": (1, 10**3), "milliseconds": (1, 10**3),
     "us": (1, 10**6), "usec": (1, 10**6), "microseconds": (1, 10**6), "ns": (1, 10**9), "nsec": (1, 10**9),
     "min": (60, 1), "minutes": (60, 1), "h": (3600, 1), "hr": (3600, 1), "hours": (3600, 1),
+    "d": (86400, 1), "days": (86400, 1),
 }  # fmt: skip  # seconds as a fraction, so that 10 ms is 0.01 s to the bit
 OTHERS = {
     "V", "A", "W", "N", "Nm", "Pa", "bar", "J", "K", "C", "F", "Hz", "T", "g", "l", "L", "Ohm", "Ω", "H", "S", "mol",
@@ -79,7 +80,7 @@ class Motion(NamedTuple):
 
 def of_motion(unit: str) -> Motion:
     """Tell what a unit of a motion is: "mm" -> ("length", 0.001), "rpm" -> ("angle", 0.10472), "V" -> ("", 1)."""
-    text = re.sub(r"\*s\^?-1$", "/s", plain(unit))
+    text = re.sub(r"\*([A-Za-z]+)\^?-1$", r"/\1", plain(unit))
     if text.lower() in ROTATIONS:
         return Motion("angle", TURN / 60)
     if text.lower() in SPEEDS:

@@ -99,7 +99,9 @@ def read(
     if described is not None:
         dataset, said = described, ()
     else:
-        choices = replace(choices, outputs=[*outputs, *simulated] if outputs else outputs)
+        choices = replace(
+            choices, outputs=[*outputs, *simulated] if simulated and not isinstance(outputs, str) else outputs
+        )
         record = record_of_logs(read_tables(source, choices), choices)
         dataset, said = dataset_of(record, name or _name_of(Path(record.source))), record.said
     theirs = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from simgap.data.formats.headings import find, listed
+from simgap.data.formats.headings import find, heading_of, listed
 from simgap.records import Channel, Dataset, Experiment, UnusableInput
 
 
@@ -19,7 +19,7 @@ def split_off(dataset: Dataset, columns: Sequence[str]) -> tuple[Dataset, Datase
     names = [channel.name for channel in outputs]
     simulated = []
     for column in columns:
-        found = find(names, column)
+        found = find(names, column) or find(names, heading_of(column).name)
         if len(found) != 1:
             raise UnusableInput(f"{dataset.name} has no output {column!r} that was simulated; "
                                 f"there are {listed(names)}")  # fmt: skip

@@ -74,7 +74,8 @@ class Job:
 
     def _kill(self) -> None:
         if self.process is not None and self.process.returncode is None:
-            os.killpg(self.process.pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # it has just ended
+                os.killpg(self.process.pid, signal.SIGKILL)
 
     def _why(self, code: int) -> str:
         if code < 0:

@@ -19,8 +19,9 @@ from simgap.data.formats.sampling import sampling_time
 from simgap.data.formats.tables import Table, missing_in
 from simgap.data.kinds import KINDS, kind_of, with_kinds
 from simgap.data.loading import Reading, read, read_tables
+from simgap.data.named import is_registered
+from simgap.data.simulated_columns import split_off
 from simgap.records import Channel, Dataset, UnusableInput
-from simgap.registry import DATASETS
 from simgap.reports.diagnosis.traces import thin
 
 POINTS = 1500  # of a curve
@@ -30,7 +31,7 @@ SIMULATED = {"sim", "simulated", "simulation"}
 
 def look(source: str) -> Look:
     """Read what a data set, a folder or a file holds. Raises UnusableInput."""
-    if source in DATASETS or is_described(Path(source)):
+    if is_registered(source) or is_described(Path(source)):
         return _of_dataset(read(source).dataset)
     return _of_logs(read_tables(source, Choices()))
 
@@ -48,7 +49,7 @@ def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: str |
             raise UnusableInput(f"column {name!r}: there are {listed(headings)}; name one of them")
         return headings[found[0]]
 
-    named = {"input": list(map(heading, inputs)), "output": list(map(heading, outputs))}
+    named = {"input": list(map(heading, inputs)), "output": list(map(heading, outputs)), "simulated": []}
     rest = [column for column in seen.columns if column.heading not in (*named["input"], *named["output"])]
     role = {of: said or [column.heading for column in rest if column.role == of] for of, said in named.items()}
     if isinstance(kinds, str) and not role["output"]:
@@ -56,20 +57,19 @@ def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: str |
     of_outputs = dict.fromkeys(role["output"], kinds) if isinstance(kinds, str) else kinds or {}
     if unknown := sorted(set(of_outputs.values()) - set(KINDS)):
         raise UnusableInput(f"kind {unknown[0]!r}: use one of {', '.join(KINDS)}")
-    return Settings(role["input"], role["output"], kinds={heading(name): kind for name, kind in of_outputs.items()})
+    return Settings(*role.values(), kinds={heading(name): kind for name, kind in of_outputs.items()})
 
 
 def dataset_of(source: str, settings: Settings) -> Reading:
     """Read the data set that the settings describe, and somebody's simulation of it. Raises UnusableInput."""
-    columns = settings.inputs, settings.outputs
-    reading = read(
-        source, *columns, settings.dt, None, None, settings.resample, settings.split_gaps, None, settings.simulated
-    )
-    dataset = with_kinds(with_units(reading.dataset, settings.units), settings.kinds or None)
-    theirs = reading.simulated
+    columns = settings.inputs, [*settings.outputs, *settings.simulated]
+    reading = read(source, *columns, settings.dt, None, None, settings.resample, settings.split_gaps)
+    dataset, theirs = with_units(reading.dataset, settings.units), None
+    if settings.simulated:
+        dataset, theirs = split_off(dataset, settings.simulated)
+    dataset = with_kinds(dataset, settings.kinds or None)
     if theirs is not None:
-        outputs = dataset.channels.outputs
-        theirs = theirs.with_channels(replace(theirs.channels, outputs=outputs))
+        theirs = theirs.with_channels(replace(theirs.channels, outputs=dataset.channels.outputs))
     return Reading(with_known(dataset, parse_known(settings.known)), reading.said, theirs)
 
 

@@ -187,7 +187,9 @@ class NextRecord:
         d = min(one.d)
         if question.interval:
             return f"{question.interval}: its interval would have {percent(narrowed(d))} of its width"
-        needed = f"; about {number(np.ceil(ENOUGH / d), 2)} such records decide" if d > 1 and not self.decides else ""
+        needed = (
+            f"; about {number(np.ceil(ENOUGH / d), 2)} such records decide" if d > 1 and one.chance < CERTAIN else ""
+        )
         return (
             f"{one.first} against {one.second}: after a new fit they still differ by {apart} RMS, where the noise is "
             f"{noise}; their log-likelihoods move {number(d / 2, 2)} apart, which decides with a chance of "

@@ -8,13 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.data.formats.clock import read_clock, time_column
-from simgap.data.formats.folder import natural_order
+from simgap.data.formats.folder import check_unit, natural_order
+from simgap.data.formats.logs import ENDINGS
 from simgap.data.formats.one_record import Choices
 from simgap.data.formats.sampling import check_clock
 from simgap.data.loading import read_table
 from simgap.records import Dataset, UnusableInput
-
-ENDINGS = (".csv", ".parquet", ".mat", ".txt", ".tsv")
 
 
 def read_candidates(source: Path, dataset: Dataset) -> dict[str, Float[np.ndarray, "T nu"]]:
@@ -39,6 +38,8 @@ def _inputs(file: Path, dataset: Dataset) -> Float[np.ndarray, "T nu"]:
     names = [channel.name for channel in dataset.channels.inputs]
     table = read_table(file, Choices(names))
     columns = [table.index(name) for name in names]
+    for channel in dataset.channels.inputs:
+        check_unit(table, channel)
     time = time_column(table, set(columns))
     if time is not None:
         check_clock(read_clock(table, time), dataset.training.dt)

@@ -133,7 +133,8 @@ def _expected(fitted: FittedPlant, candidates: Sequence[Experiment], new: Sequen
     records = Records.of(candidates, fitted.outputs)
     start = np.repeat(local.mean(axis=0, keepdims=True), len(candidates), axis=0)
     if plant.machine is not None and plant.machine.controlled:
-        start[:, 0] = records.u[:, 0, plant.machine.of_drive]  # where its controller holds it
+        goal = records.u[:, 0, plant.machine.of_drive]
+        start[:, 0] = goal * plant.machine.known.goal_factor  # where its controller holds it
     more, slopes = _of_each(fitted, records, theta, start, sizes)
     total, known = slopes.sum(axis=0), held.sum(axis=0) + np.eye(len(sizes))
     after = [float(np.trace(total @ np.linalg.inv(known + more[k]))) for k in new]

@@ -80,8 +80,8 @@ def limits_of(
         low[i], high[i] = _ordered("input_range", first, last)
     for i, value in _by_channel("rate", rate, inputs, moved).items():
         rates[i] = value
-        if not value > 0:
-            raise UnusableInput(f"rate {value:g}: an input must be allowed to move")
+        if not 0 < value < np.inf:
+            raise UnusableInput(f"rate {value:g}: give a finite number above zero, so that the input can move")
     travel_low, travel_high = y.min(axis=0), y.max(axis=0)
     every = tuple(range(y.shape[1]))
     for j, (first, last) in _by_channel("travel", travel, dataset.channels.outputs, every).items():

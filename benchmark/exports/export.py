@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 from simgap.data import load
 from simgap.data.formats.plant_table import read_forces, with_known
+from simgap.data.measured.locations import one_line
 from simgap.exports import subjects
 from simgap.exports.folders import ABOUT, read_folder, write_folder
 from simgap.exports.subjects import Subject
@@ -64,11 +66,15 @@ def export(
     limit = target.check(subject) if hasattr(target, "check") else subject.limit
     files = {} if into is None else target.patch(subject, Path(into), joint)
     out.mkdir(parents=True, exist_ok=True)
-    write_folder(subject, to, out, limit)
-    target.write(subject, out)
-    for name, text in files.items():
-        (out / name).write_text(text, encoding="utf-8")
-    return verify(out)
+    try:
+        write_folder(subject, to, out, limit)
+        target.write(subject, out)
+        for name, text in files.items():
+            (out / name).write_text(text, encoding="utf-8")
+        return verify(out)
+    except BaseException:
+        shutil.rmtree(out)  # it was new or empty, and half an export is none
+        raise
 
 
 def verify(folder: str | Path) -> Verification:
@@ -78,7 +84,12 @@ def verify(folder: str | Path) -> Verification:
     target = _format(about.format)
     if missing := target.missing():
         raise UnusableInput(f"{about.format}: {missing}")
-    differences = {one.name: one.difference(target.run(folder, about, one)) for one in about.records}
+    try:
+        differences = {one.name: one.difference(target.run(folder, about, one)) for one in about.records}
+    except UnusableInput:
+        raise
+    except Exception as error:  # somebody may have changed or cut what is in the folder
+        raise UnusableInput(f"{folder}: what is there does not run as {about.format}: {one_line(error)}") from error
     if not differences:
         raise UnusableInput(f"{folder / ABOUT} names no record to compare with")
     return Verification(about.format, differences, about.limit)
@@ -136,7 +147,7 @@ def _subject(
             x, seen = _record(data, experiment), data.training.train + data.training.valid + data.test
         else:
             x = matching_experiments(about, data, experiment, *reading)[0]
-            seen = matching_experiments(about, data, None, *reading)
+            seen = matching_experiments(about, data, None, *reading, every=True)
     else:
         check_model(str(model), to)  # first, because data and a fit take their time
         torque_constant = {key: known.pop(key) for key in ("torque_constant",) if key in known}

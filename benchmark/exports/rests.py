@@ -105,7 +105,7 @@ class GreyBoxWithRest:
         step = f'def step(s: list, u: list, y: list):\n    """Simulate, and add what was learnt."""\n    {body}\n'
         grey = self.grey.form.source.replace("def step(", "def grey_step(")
         source = "\n\n\n".join([grey.rstrip(), *(source_of(one).rstrip() for one in FUNCTIONS), step])
-        self.form = StepForm(source, self.constants, np.zeros(self.cells.taken), nu, ny, True)
+        self.form = StepForm(source, self.constants, np.zeros(self.cells.taken), nu, ny, True, held=self.grey.form.held)
 
     def _constant(self, name: str, value: Any) -> str:
         self.constants[name] = np.asarray(value, dtype=np.float64).ravel()

@@ -74,14 +74,18 @@ def simulate(
 
 def matching_experiments(
     about: FittedOn, data: Any, experiment: str | None = None, dt: float | None = None,
-    resample: float | None = None, split_gaps: bool = False,
+    resample: float | None = None, split_gaps: bool = False, every: bool = False,
 ) -> list[Experiment]:  # fmt: skip
-    """Read the records that `simulate` takes, for a model that was fitted on such data. Raises UnusableInput."""
+    """Read the records that `simulate` takes, for a model that was fitted on such data; or `every` one of a data set.
+
+    Raises UnusableInput.
+    """
     recordings = read_recordings(data, about.channels, dt, resample, split_gaps)
     source = os.fspath(data) if isinstance(data, str | os.PathLike) else "the data"
     for role in ("inputs", "outputs"):
         _check_columns(source, role, getattr(recordings.channels, role), getattr(about.channels, role))
     chosen = _chosen(source, recordings.experiments, recordings.others, experiment)
+    chosen = [*recordings.experiments, *recordings.others] if every else chosen
     for x in chosen:
         _check_samples(about, source, x)
     return list(chosen)

@@ -27,6 +27,7 @@ DAY = timedelta(days=1) // MICROSECOND
 # Numbers without a unit that lie within the years 2000 to 2100 when they count milliseconds since 1970: no record in
 # seconds gets there.
 EPOCH = (946_684_800, 4_102_444_800)
+DAYS = ((36_526, 73_051), (730_486, 767_011))  # the same years in days of Excel, and of MATLAB's datenum
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,9 @@ def _counted(table: Table, column: str, t: Float[np.ndarray, " T"]) -> Clock:
     if not unit and t.size and abs(t[0]) >= EPOCH[0] * 1000:
         why = f"{t[0]:.6g} s is no time of a record; write the unit into the heading, such as 'time [us]'"
         raise table.refuse(0, column, why)
+    if not unit and t.size > 1 and any(low < t[0] < high for low, high in DAYS) and np.median(np.diff(t)) < 1e-3:
+        why = f"{t[0]:.9g} may count days, as Excel and MATLAB do, or seconds; write the unit into the heading"
+        raise table.refuse(0, column, f"{why}, such as 'time [d]' or 'time [s]'")
     times, parts = seconds_in(unit or "s") or (1, 1)
     if (times, parts) == (1, 1):
         return Clock(table, column, t)

@@ -9,10 +9,13 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from simgap.data.formats.csv_files import read_csv
 from simgap.data.formats.description import FILE, Description, read_description
+from simgap.data.formats.headings import find
 from simgap.data.formats.plant_table import check_records
 from simgap.data.formats.sampling import check_time
+from simgap.data.formats.tables import Table
 from simgap.data.splits import assemble, hold_out_tails
 from simgap.records import Channel, Dataset, Experiment, UnusableInput
+from simgap.units import plain
 
 
 def load_folder(folder: Path, more: Sequence[str] = ()) -> Dataset:
@@ -53,7 +56,18 @@ def _experiment(file: Path, name: str, described: Description) -> Experiment:
         check_time(table, described.time, described.sampling_time)
     inputs = [channel.name for channel in described.channels.inputs]
     outputs = [channel.name for channel in described.channels.outputs]
+    for channel in (*described.channels.inputs, *described.channels.outputs):
+        check_unit(table, channel)
     return table.experiment(name, inputs, outputs, described.sampling_time)
+
+
+def check_unit(table: Table, channel: Channel) -> None:
+    """Raise UnusableInput where the heading of a file says another unit than the data set has."""
+    found = find(table.names, channel.name)
+    unit = table.heading(table.names[found[0]]).unit if len(found) == 1 else ""
+    if unit and channel.unit and plain(unit) != plain(channel.unit):
+        raise UnusableInput(f"{table.source}: {channel.name} is in {unit}, but in {channel.unit} in the data set; "
+                            "convert the column")  # fmt: skip
 
 
 def _matching(folder: Path, split: str, pattern: str) -> list[Path]:

@@ -17,6 +17,7 @@ TIME_NAMES = frozenset({
     "time", "timestamp", "time stamp", "datetime", "date time", "date/time", "elapsed time", "elapsed", "zeit",
     "zeitstempel", "uhrzeit", "seconds", "milliseconds", "millis", "microseconds", "micros",
 })  # fmt: skip
+TEMPERATURES = ("T_h", "T_s", "T_min", "T_d")  # hot, of the surface, the lowest, of the dew point
 UNIT_IN_NAME = {"seconds": "s", "milliseconds": "ms", "millis": "ms", "microseconds": "us", "micros": "us"}
 
 
@@ -51,7 +52,7 @@ def time_unit(text: str, unit: str = "") -> str | None:
     heading = heading_of(text)
     name, unit = heading.name, heading.unit or unit
     if not unit and (match := re.fullmatch(r"(.+)(?:_|,\s*)([A-Za-z]+)", name)) and seconds_in(match[2].lower()):
-        name, unit = match[1], match[2].lower()
+        name, unit = match[1], match[2].lower() if text not in TEMPERATURES else ""
     small = name.casefold().replace("_", " ").strip()
     unit = unit or UNIT_IN_NAME.get(small, "")
     if unit and not seconds_in(unit):

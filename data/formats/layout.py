@@ -92,7 +92,8 @@ def _units(cells: list[str], columns: int) -> tuple[str, ...]:
     units = tuple(re.sub(r"^[\[(](.*)[\])]$", r"\1", cell.strip()).strip() for cell in cells)
     known = [quantity(unit) for unit in units if unit]
     sure = all(known) and any(one and not one.label for one in known)
-    return units if len(units) == columns and sure else ()
+    numbers = sum(map(bool, map(NUMBER.fullmatch, units)))  # a 1 may say that a column has no unit
+    return units if len(units) == columns and sure and 2 * numbers < len(known) else ()
 
 
 def _decimal(text: str, start: int, separator: str) -> str:

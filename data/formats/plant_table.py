@@ -24,14 +24,17 @@ IN_FILE, AS_OPTION = "[plant]", "--known"  # where a person wrote the table
 MOVING = ("position", "velocity", "level")  # kinds of outputs that a machine moves
 STANDARD_GRAVITY = 9.80665
 TICKS = ("tick", "ticks", "count", "counts")
+FORCES = {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "mN": 1e-3}
 # What a unit is worth in SI. A quantity without a unit is in SI already.
 UNITS = {
     "mass": {"kg": 1.0, "g": 1e-3, "lb": 0.45359237},
     "arm": {unit: of_motion(unit).factor for unit in ("m", "cm", "mm", "in", "ft")},
-    "inertia": {"kgm2": 1.0, "gm2": 1e-3, "kgcm2": 1e-4, "gcm2": 1e-7, "kg": 1.0, "g": 1e-3, "m2": 1.0, "cm2": 1e-4},
+    "inertia": {"kgm2": 1.0, "gm2": 1e-3, "kgcm2": 1e-4, "gcm2": 1e-7, "kg": 1.0, "g": 1e-3},
+    "area": {"m2": 1.0, "cm2": 1e-4},
     "damping": {"Nms/rad": 1.0, "Nms": 1.0, "Ns/m": 1.0, "m2/s": 1.0},
     "supply": {"V": 1.0, "mV": 1e-3, "%": 1e-2, "duty": 1.0},
-    "gain": {},
+    "torque_constant": {f"{unit}{per}": size for per in ("", "/A", "/V") for unit, size in FORCES.items()},
+    "gain": {},  # of a controller: its output per unit of the error, whatever these are
     "derivative": {},
 }
 
@@ -53,8 +56,8 @@ def read_plant(table: Any, channels: Channels, where: str, called: str = IN_FILE
     controller = table.get("controller")
     used: list[str] = []
 
-    def constant(owner: Mapping[str, Any], key: str, quantity: str = "") -> Known | None:
-        return _known(owner[key], quantity or key, key, channels, where, used) if key in owner else None
+    def constant(owner: Mapping[str, Any], key: str) -> Known | None:
+        return _known(owner[key], key, channels, where, used) if key in owner else None
 
     if controller is not None:
         _check_table(controller, CONTROLLER_KEYS, f"{where}: controller", required=("goal",))
@@ -63,7 +66,7 @@ def read_plant(table: Any, channels: Channels, where: str, called: str = IN_FILE
     if "inertia" in table and "area" in table:
         raise UnusableInput(f"{where}: inertia and area are the same number of two machines; leave one out")
     known = {key: constant(table, key) for key in ("mass", "arm", "damping", "supply")}
-    inertia = constant(table, "inertia") or constant(table, "area", "inertia")
+    inertia = constant(table, "inertia") or constant(table, "area")
     of_controller = {key: constant(controller or {}, key) for key in ("gain", "derivative")}
     enabled = _column(table["enabled"], "enabled", inputs, where, used) if "enabled" in table else ""
     for key in ("damping", "derivative"):
@@ -136,6 +139,8 @@ def with_known(dataset: Dataset, table: Mapping[str, Any] | None) -> Dataset:
     """Say of a data set what is known of its machine, as a table [plant] would. Raises UnusableInput."""
     if not table:
         return dataset
+    if dataset.channels.plant is not None:
+        raise UnusableInput(f"{dataset.name} has a table {IN_FILE} already; write {AS_OPTION} into that")
     plant = read_plant(table, dataset.channels, dataset.name, AS_OPTION)
     channels = replace(dataset.channels, plant=plant)
     training = dataset.training
@@ -151,11 +156,11 @@ def read_forces(table: Mapping[str, Any], where: str = "--known") -> dict[str, f
     _check_table(table, ("inertia", "mass", "arm", "torque_constant"), where)
     if "arm" in table and "mass" not in table:
         raise UnusableInput(f"{where}: arm needs the mass that it carries; add mass, or give inertia")
-    read = {key: _quantity(value, key, key, where) for key, value in table.items() if key != "torque_constant"}
+    read = {key: _quantity(value, key, where, key) for key, value in table.items() if key != "torque_constant"}
     inertia = read.get("inertia", 0.0) + read.get("mass", 0.0) * read.get("arm", 1.0) ** 2
     forces = {"inertia": inertia} if inertia else {}
     if "torque_constant" in table:
-        forces["torque_constant"] = _quantity(table["torque_constant"], "gain", "torque_constant", where)
+        forces["torque_constant"] = _quantity(table["torque_constant"], "torque_constant", where)
     return forces
 
 
@@ -170,6 +175,10 @@ def parse_known(options: Sequence[str], where: str = "--known") -> dict[str, Any
         owner = table
         for part in path:
             owner = owner.setdefault(part, {})
+            if not isinstance(owner, dict):
+                raise UnusableInput(f"{where}: {part} is given twice, once as a number or a column; give it once")
+        if name in owner:
+            raise UnusableInput(f"{where}: {key.strip()} is given twice; give it once")
         value = value.strip()
         low, between, high = value.partition("..")
         if between:
@@ -182,11 +191,11 @@ def parse_known(options: Sequence[str], where: str = "--known") -> dict[str, Any
     return table
 
 
-def _known(value: Any, quantity: str, key: str, channels: Channels, where: str, used: list[str]) -> Known:
+def _known(value: Any, key: str, channels: Channels, where: str, used: list[str]) -> Known:
     if isinstance(value, Mapping):
         _check_table(value, INTERVAL_KEYS, f"{where}: {key}", required=("low", "high"))
-        low, high = (_quantity(value[end], quantity, f"{key}.{end}", where) for end in ("low", "high"))
-        middle = _quantity(value["value"], quantity, f"{key}.value", where) if "value" in value else 0.5 * (low + high)
+        low, high = (_quantity(value[end], key, where, f"{key}.{end}") for end in ("low", "high"))
+        middle = _quantity(value["value"], key, where, f"{key}.value") if "value" in value else 0.5 * (low + high)
         if not low < high or not low <= middle <= high:
             raise UnusableInput(f"{where}: {key} must have low < high, and its value between them")
         return Known(middle, low, high)
@@ -194,28 +203,35 @@ def _known(value: Any, quantity: str, key: str, channels: Channels, where: str, 
     if isinstance(value, str) and (value in names or not NUMBER.fullmatch(value)):
         column = _column(value, key, names, where, used)
         unit = channels.inputs[names.index(column)].unit
-        return Known(column=column, factor=_factor(unit, quantity, f"{key}, column {short(column)},", where))
-    number = _quantity(value, quantity, key, where)
+        unit = unit if UNITS[key] else ""  # of a controller's gain it may be anything
+        return Known(column=column, factor=_factor(unit, key, where, f"{key}, column {short(column)},"))
+    number = _quantity(value, key, where, key)
     return Known(number, number, number)
 
 
-def _quantity(value: Any, quantity: str, key: str, where: str) -> float:
+def _quantity(value: Any, key: str, where: str, called: str = "") -> float:
     number, unit = value, ""
     if isinstance(value, str) and (found := NUMBER.fullmatch(value)):
         number, unit = float(found[1]), found[2] or ""
-    number = _number(number, key, where)
-    if number < 0 or (number == 0 and quantity in ("mass", "arm", "supply", "gain")):
-        raise UnusableInput(f"{where}: {key} is {number:g}; it must be positive")
-    return number * _factor(unit, quantity, key, where)
+    called = called or key
+    number = _number(number, called, where)
+    if number < 0 or (number == 0 and key in ("mass", "arm", "supply", "gain", "torque_constant")):
+        raise UnusableInput(f"{where}: {called} is {number:g}; it must be positive")
+    return number * _factor(unit, key, where, called)
 
 
-def _factor(unit: str, quantity: str, key: str, where: str) -> float:
+def _factor(unit: str, key: str, where: str, called: str) -> float:
     plain = re.sub(r"[\s^*·]", "", unit).replace("²", "2")
-    if not plain or quantity in ("gain", "derivative"):
+    if not plain:
         return 1.0
-    known = UNITS[quantity]
+    known = UNITS[key]
     if plain not in known:
-        raise UnusableInput(f"{where}: {key} is in {short(unit)}; write it in one of {', '.join(known)}")
+        remedy = (
+            f"write it in one of {', '.join(known)}"
+            if known
+            else ("write it without: it is the controller's output for an error of 1 in the unit of the output")
+        )
+        raise UnusableInput(f"{where}: {called} is in {short(unit)}; {remedy}")
     return known[plain]
 
 

@@ -43,11 +43,15 @@ def check_even(clock: Clock, dt: float, remedy: str = "") -> None:
 
 
 def check_coarse(clock: Clock, dt: float) -> None:
-    """Raise UnusableInput unless a coarse clock runs forward and agrees with dt to 1 %, or to one of its stamps."""
+    """Raise UnusableInput unless a coarse clock runs forward, without a gap, and agrees with dt to 1 % or one stamp."""
     steps = np.diff(clock.seconds)
     if np.any(steps < 0):
         raise refuse_step(clock, int(np.argmax(steps < 0)), dt, "split the file there")
     if np.any(steps > 0):
+        stamps = np.flatnonzero(steps > 0)  # the last row before each new stamp
+        late = steps[stamps[1:]] - dt * np.diff(stamps)  # rows that are missing between two new stamps
+        if np.any(gap := late > GAP * dt + 0.5 * np.median(steps[stamps])):
+            raise refuse_step(clock, int(stamps[1:][np.argmax(gap)]), dt, "rows are missing there: split the file")
         _check_mean(clock, dt, DRIFT_TOLERANCE * dt + float(np.median(steps[steps > 0])) / len(steps))
 
 

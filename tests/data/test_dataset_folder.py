@@ -187,3 +187,11 @@ def test_an_input_that_moves_between_but_not_within_experiments_is_accepted(good
 
 def test_the_columns_of_a_folder_cannot_be_named_again(good, refused):
     assert "knows its columns" in refused(good, inputs=["u"])
+
+
+def test_a_file_in_another_unit_than_the_description_is_refused(good, refused):
+    file = good / "train" / "001.csv"
+    file.write_text(file.read_text().replace("t,u,phi", "t,u [V],phi [deg]"))
+    load(good)
+    file.write_text(file.read_text().replace("phi [deg]", "phi [rad]"))
+    assert "001.csv: phi is in rad, but in deg in the data set; convert the column" in refused(good)

@@ -60,6 +60,7 @@ def test_what_is_no_unit_is_none(text):
     [
         ("t", ""), ("Time", ""), ("TIME (s)", "s"), ("t_ms", "ms"), ("time [ms]", "ms"), ("T [s]", "s"),
         ("t, s", "s"), ("Timestamp", ""), ("TIME_US", "us"), ("Elapsed Time (min)", "min"), ("millis", "ms"),
+        ("T_ms", "ms"), ("T_h", None), ("T_min", None), ("T_s", None), ("time [d]", "d"),
         ("T", None), ("T [degC]", None), ("t [degC]", None), ("t, left", None), ("time_step", None), ("thrust", None),
         ("x [s]", None),
     ],
@@ -176,6 +177,7 @@ def test_the_kind_of_a_registered_data_set_or_a_folder_may_be_said(good):
         ("mm/min", "length", 1e-3 / 60), ("m·s⁻¹", "length", 1.0), ("rad/s", "angle", 1.0), ("mrad", "angle", 1e-3),
         ("Degrees", "angle", np.pi / 180), ("°/s", "angle", np.pi / 180), ("rpm", "angle", np.pi / 30),
         ("rev/min", "angle", np.pi / 30), ("V", "", 1.0), ("", "", 1.0), ("ticks", "", 1.0), ("m/V", "", 1.0),
+        ("m·min⁻¹", "length", 1 / 60),
     ],
 )  # fmt: skip
 def test_a_unit_of_a_motion_says_what_it_is_in_si(unit, kind, factor):

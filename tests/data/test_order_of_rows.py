@@ -72,6 +72,14 @@ def test_a_sampling_time_that_contradicts_a_coarse_clock_is_refused(refused):
     assert "split the file there" in refused(frame(np.append(t[:150], t[:150])), *COLUMNS, dt=0.01)
 
 
+@pytest.mark.parametrize("chosen", [{}, {"split_gaps": True}])
+def test_a_pause_that_a_coarse_clock_shows_is_not_bridged(refused, chosen):
+    t = np.where(np.arange(N) < 155, EVEN, EVEN + 0.3) // 0.1 * 0.1
+    sentence = refused(frame(t), *COLUMNS, dt=0.01, **chosen)
+    assert "row 155" in sentence
+    assert "rows are missing there: split the file" in sentence
+
+
 def test_a_row_that_is_there_twice_is_still_to_be_deleted(refused):
     t = EVEN.copy()
     t[100:] -= 0.01

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import simgap
-from simgap.data.formats.plant_table import parse_known, read_plant
+from simgap.data.formats.plant_table import parse_known, read_forces, read_plant
 from simgap.data.formats.plant_writing import plant_lines
 from simgap.data.simulated.rigs import hide
 from simgap.records import Channel, Channels, UnusableInput
@@ -78,6 +78,8 @@ def test_a_saved_data_set_keeps_what_is_known_of_its_machine(tmp_path):
         (CART, {"maas": 1.0}, "unknown key 'maas'"),
         (CART, {"mass": -1.0}, "mass is -1; it must be positive"),
         (CART, {"mass": "0.5 V"}, "mass is in 'V'; write it in one of kg, g"),
+        (CART, {"inertia": "5 m2"}, "inertia is in 'm2'; write it in one of kgm2"),
+        (SERVO, {**TABLE, "controller": {"goal": "r", "gain": "5 mV/deg"}}, "gain is in 'mV/deg'; write it without"),
         (CART, {"mass": "load"}, "'load', which is no input; there are force"),
         (CART, {"mass": {"low": 2, "high": 1}}, "low < high"),
         (CART, {"mass": [1]}, "give a number"),
@@ -113,6 +115,19 @@ def test_options_are_written_like_mass_0_5_kg():
     }  # fmt: skip
     with pytest.raises(UnusableInput, match=r"must be written like mass=0\.5kg"):
         parse_known(["mass"])
+    for twice in (["mass=1kg", "mass=3kg"], ["controller=r", "controller.gain=2"], ["mass=1kg", "mass.low=2"]):
+        with pytest.raises(UnusableInput, match="given twice"):
+            parse_known(twice)
+
+
+def test_a_torque_constant_has_its_unit():
+    assert read_forces({"torque_constant": "50 mNm/A"}) == {"torque_constant": pytest.approx(0.05)}
+
+
+def test_what_a_folder_says_of_its_machine_is_not_replaced_by_an_option(tmp_path):
+    write(tmp_path, [lambda k: 1.0, lambda k: 2.0])
+    with pytest.raises(UnusableInput, match=r"has a table \[plant\] already; write --known into that"):
+        simgap.load(tmp_path, known={"damping": 1.0})
 
 
 def write(folder, masses):

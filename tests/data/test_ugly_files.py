@@ -102,6 +102,7 @@ def test_nothing_is_said_of_a_plain_file(tmp_path):
 
 
 BAD = {
+    "days of Excel": (text("time,u,phi", [45413 + t / 86400 for t in T]), 2, "time", "may count days"),
     "a point in a file of decimal commas": (
         text("t;u;phi", T, ";", ",").replace("0,02;", "0.02;"), 4, "t", "this file has decimal commas"),
     "a comma in a file of decimal points": (text("t;u;phi", T, ";").replace("0.02;", "0,02;"), 4, "t", "like -1.25"),

@@ -8,7 +8,10 @@ import pytest
 from their_simulations import draw, first_name_is_right, simulation
 
 import simgap
+from simgap.app.orders import Settings
+from simgap.app.reading import dataset_of
 from simgap.cli import main
+from simgap.data import read
 from simgap.data.simulated.rigs import hide
 from simgap.diagnosis.diagnose import diagnose
 from simgap.records import UnusableInput
@@ -160,6 +163,13 @@ def test_a_folder_may_hold_the_column_whether_its_toml_names_it_or_not(log, tmp_
         assert [channel.name for channel in reading.dataset.channels.outputs] == ["x"]
         assert np.allclose(reading.simulated.test[0].y, simulated.test[0].y)
         assert np.allclose(reading.dataset.test[0].y, stage.test[0].y)
+
+
+def test_a_simulated_column_may_be_named_by_its_whole_heading_and_get_a_unit_on_the_page(log):
+    assert read(str(log), ["u"], ["y"], simulated=["y_sim (m/s)"]).simulated is not None
+    log.write_text(log.read_text().replace("y (m/s)", "y", 1))
+    settings = Settings(["u"], ["y"], ["y_sim (m/s)"], units={"y": "m/s"})
+    assert dataset_of(str(log), settings).simulated.channels.outputs[0].unit == "m/s"
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def test_limits_that_nobody_gives_are_those_of_the_training_records(data):
     [
         ({"input_range": (3.0, -4.0)}, "lower limit first"),
         ({"travel": {"w": (0.0, 1.0)}}, "no column 'w'"),
-        ({"rate": 0.0}, "must be allowed to move"),
+        ({"rate": 0.0}, "finite number above zero"),
         ({"seconds": 0.5}, "a record needs 40 samples"),
     ],
 )

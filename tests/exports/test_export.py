@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import simgap
 from simgap.cli import main
 from simgap.data.simulated.rigs import hide
-from simgap.exports.export import export, verify
+from simgap.exports.export import _subject, export, verify
 from simgap.exports.folders import read_folder
 from simgap.records import UnusableInput
 
@@ -112,6 +113,27 @@ def test_a_damaged_export_is_refused(saved):
     (saved / "out" / "record.csv").unlink()
     with pytest.raises(UnusableInput, match=r"record.csv is missing"):
         verify(saved / "out")
+
+
+def test_an_export_that_cannot_run_is_refused_and_a_new_one_leaves_nothing_behind(saved, monkeypatch):
+    export(saved / "stage.simgap", saved / "stage", "python", saved / "out")
+
+    def fails(*_):
+        raise ValueError("torn")
+
+    monkeypatch.setattr("simgap.exports.formats.python.run", fails)
+    with pytest.raises(UnusableInput, match="what is there does not run as python: torn"):
+        verify(saved / "out")
+    with pytest.raises(UnusableInput, match="torn"):
+        export(saved / "stage.simgap", saved / "stage", "python", saved / "new")
+    assert not (saved / "new").exists()
+
+
+def test_a_gymnasium_of_a_saved_model_has_the_range_of_all_records_of_a_data_set(saved, stage):
+    training = replace(stage.training, train=tuple(replace(x, u=3 * x.u) for x in stage.training.train))
+    simgap.save(replace(stage, training=training, sha256=""), saved / "wide")
+    subject = _subject(saved / "stage.simgap", saved / "wide", "gymnasium", {}, 0, None, (None, None, False), {})
+    assert subject.input_range[1] == pytest.approx(max(x.u.max() for x in training.train))
 
 
 def test_names_of_columns_do_no_harm(saved, stage):

@@ -45,13 +45,15 @@ function settings() {
   const isFixed = rows.some((row) => field(row, "role").disabled);
   const used = rows.filter((row) => field(row, "role").value && field(row, "role").value !== "simulated");
   if (!isFixed && !(of("input").length && of("output").length)) throw new Error("Say which columns are inputs and which are outputs: at least one of each.");
-  const dt = number("dt", "The sampling time");
-  if (form.elements.dt && dt === null) throw new Error("Say the sampling time in seconds: no column tells the time.");
+  const resample = number("resample", "The step of the even grid"), splitGaps = form.elements.split_gaps?.checked ?? false;
+  const dt = resample === null ? number("dt", "The sampling time") : null;
+  const byClock = resample !== null || (splitGaps && form.elements.resample); // a column tells the time then
+  if (form.elements.dt && dt === null && !byClock) throw new Error("Say the sampling time in seconds: no column tells the time.");
   return {
-    inputs: of("input"), outputs: of("output"), simulated: of("simulated"), dt, resample: number("resample", "The step of the even grid"),
+    inputs: of("input"), outputs: of("output"), simulated: of("simulated"), dt, resample,
     units: Object.fromEntries(used.map((row) => [row.dataset.column, field(row, "unit")]).filter(([, unit]) => unit.value.trim() !== unit.dataset.read).map(([column, unit]) => [column, unit.value.trim()])),
     kinds: Object.fromEntries(used.map((row) => [row.dataset.column, field(row, "kind")]).filter(([, kind]) => !kind.disabled && kind.value).map(([column, kind]) => [column, kind.value])),
-    split_gaps: form.elements.split_gaps?.checked ?? false,
+    split_gaps: splitGaps,
     known: form.elements.known.value.split("\n").map((line) => line.trim()).filter(Boolean),
   };
 }
