@@ -152,9 +152,11 @@ class TrainingSet:
     @property
     def held_out(self) -> tuple[Experiment, ...]:
         """What a model may choose on: the validation records longer than n_init, or else those of training."""
-        return tuple(x for x in self.valid if len(x) > self.n_init) or tuple(
-            x for x in self.train if len(x) > self.n_init
-        )
+        return self.without_mere_starts().valid or tuple(x for x in self.train if len(x) > self.n_init)
+
+    def without_mere_starts(self) -> TrainingSet:
+        """Return the same without validation records of n_init samples or fewer, which can judge nothing."""
+        return replace(self, valid=tuple(x for x in self.valid if len(x) > self.n_init))
 
     def as_runs(self) -> TrainingSet:
         """Return the same records as if each were a run of its own, for models that are not told the time."""

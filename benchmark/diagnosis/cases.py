@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class CaseResult:
         answers = [{name, *others} for name, others in zip(self.named, self.confounded, strict=True)]
         if len(hidden) == 1:
             return bool(answers) and hidden[0] in answers[0]
-        return all(any(name in answer for answer in answers) for name in hidden)
+        return any(all(map(set.__contains__, some, hidden)) for some in permutations(answers, len(hidden)))
 
 
 def room_of(rig: str) -> Any:

@@ -19,7 +19,7 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
     samples = sum(map(len, training.train))
     if samples < SHORT:
         sentences.append(f"There are only {samples} training samples: weak effects cannot be told from noise.")
-    if not training.valid:
+    if not any(len(x) > training.n_init for x in training.valid):
         sentences.append("There are no validation data: effects were accepted on the training data alone.")
     if len(training.train) == 1:
         sentences.append(

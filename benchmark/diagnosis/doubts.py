@@ -87,7 +87,9 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     means, within = np.array([y.mean() for y in read]), np.sqrt(np.mean([y.var() for y in read]))
     poles = -np.real(dynamics.poles(plant, trial.estimate.theta)) if plant.order else np.ones(1)
     name = channels.outputs[baseline.outputs[0]].name
-    if len(means) > 1 and np.std(means) > within and not baseline.cut:  # else they are those of pieces
+    if not np.ptp(np.concatenate(read)):
+        why = f"{name} never moves. Check the sensor and its cable"
+    elif len(means) > 1 and np.std(means) > within and not baseline.cut:  # else they are those of pieces
         why = f"{name} works at another operating point in each record. Record around one of them"
     elif poles.min() * records.duration < 1:
         why = f"{name} integrates, so that the smallest offset grows. Record shorter runs, each from a known level"

@@ -21,7 +21,10 @@ from simgap.running.source import closure
 
 FILE = Path("recovery") / "cases.jsonl"
 # The code that decides a case; where it changes, stored cases are computed again.
-ROOMS = ("diagnosis", "error_views", "findings", "metrics", "greybox", "baselines", "data.simulated")
+ROOMS = (
+    "diagnosis", "error_views", "findings", "metrics", "greybox", "baselines", "subspace", "known_plant", "units",
+    "data.simulated",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,8 @@ def repeated(experiments: Sequence[Experiment], n_init: int) -> list[list[int]]:
     """Group the experiments that are runs of one input from nearly the same start, two at least."""
     sizes = sizes_of(np.concatenate([x.y for x in experiments]))
     means = [x.y[:n_init].mean(axis=0) for x in experiments]
-    spreads = [sizes_of(x.u) for x in experiments]
+    usual = sizes_of(np.concatenate([x.u for x in experiments]))
+    spreads = [np.where(np.any(x.u, axis=0), sizes_of(x.u), usual) for x in experiments]
     groups: list[list[int]] = []
     for i, x in enumerate(experiments):
         alike = (

@@ -45,7 +45,8 @@ class SideBySide:
     @classmethod
     def of(cls, machine: FittedPlant, dataset: Dataset, simulated: Dataset, seed: int) -> SideBySide:
         """Fit the machine's plant to the simulation too; where it does not fit, with the effects found there."""
-        experiments = (*simulated.training.train, *simulated.training.valid)
+        training = simulated.training.without_mere_starts()
+        experiments = (*training.train, *training.valid)
         error = _error(machine, experiments, dataset.n_init)
         own, squares = machine.estimate.plant.terms, float(np.vdot(error, error))
         simulation = _fit(machine, experiments)
@@ -191,8 +192,8 @@ def _with_more(machine: FittedPlant, terms: Sequence[Term]) -> FittedPlant:
     plant = estimate.plant.having([*estimate.plant.terms, *terms])
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
     for term in terms:
-        starts = plant.starts_of(term)
+        starts, common = plant.starts_of(term), len(plant.common_of(term))
         if starts:
-            theta[plant.part_of(term)] = starts[0].values
+            theta[plant.part_of(term)] = starts[0].values[len(starts[0].values) - common :]
     fitted = descend(Problem(plant, machine.records, machine.noise), theta, local)
     return replace(machine, estimate=fitted)

@@ -44,7 +44,8 @@ def judge(answer: Diagnosis, dataset: Dataset, simulated: Dataset, seed: int, vi
         verdict = "named" if causes else "nothing_found"
     if verdict == "named" and not (gain.low > 0 and _confirmed(found, sides, causes, dataset, before)):
         verdict = "suspected"
-    runs = [z.y[n:] for z in (*simulated.training.train, *simulated.training.valid)]
+    training = simulated.training.without_mere_starts()
+    runs = [z.y[n:] for z in (*training.train, *training.valid)]
     sentences = [f"No model here repeats {100 * side.unlike:.0f} % of the variance of your simulation: what it holds "
                  "beside the named effects is not known." for side in sides if side.unlike > UNLIKE]  # fmt: skip
     findings = replace(
@@ -91,19 +92,29 @@ def _with_kinds(channels: Channels, found: Findings) -> Channels:
 
 def _causes(found: Findings, sides: Sequence[SideBySide], dataset: Dataset) -> tuple[Cause, ...]:
     """List what the simulation lacks, has in another size or should not have; what makes the largest error first."""
-    known = {(cause.effect, cause.channel): cause for cause in found.effects}
+    known = {cause.key: cause for cause in found.effects}
     listed = []
     for side in sides:
         for term in side.terms:
             holds = side.holds(term)
             if holds is None:
                 continue
-            cause = known.pop((term.effect.name, _channel(term, side, dataset)), None) or _added(side, term, dataset)
+            cause = known.pop(_key(term, side, dataset), None) or _added(side, term, dataset)
             listed.append(replace(cause, evidence=side.share(term), holds=holds, simulated=_values(side, term)))
         for term in side.terms:
-            known.pop((term.effect.name, _channel(term, side, dataset)), None)
+            known.pop(_key(term, side, dataset), None)
     outliers = [replace(cause, holds="missing") for cause in known.values()] if sides else []
     return tuple(outliers + sorted(listed, key=lambda cause: -cause.evidence))
+
+
+def _key(term: Term, side: SideBySide, dataset: Dataset) -> tuple[str, str, str]:
+    """Return the effect, its channel and the output of its plant, as a cause has them."""
+    return term.effect.name, _channel(term, side, dataset), _output(side, dataset)
+
+
+def _output(side: SideBySide, dataset: Dataset) -> str:
+    outputs, every = side.machine.outputs, dataset.channels.outputs
+    return every[outputs[0]].name if len(outputs) < len(every) else ""
 
 
 def _channel(term: Term, side: SideBySide, dataset: Dataset) -> str:
@@ -122,6 +133,7 @@ def _added(side: SideBySide, term: Term, dataset: Dataset) -> Cause:
     return Cause(
         effect.name, effect.title, text, effect.reference, _channel(term, side, dataset),
         evidence=0.0, gain=0.0, log_likelihood_ratio=0.0, parameters=values, shows_in=effect.shows_in,
+        output=_output(side, dataset),
     )  # fmt: skip
 
 
@@ -216,5 +228,5 @@ def _stages(side: SideBySide, causes: Sequence[Cause], dataset: Dataset) -> list
 
 def _terms_of(causes: Sequence[Cause], side: SideBySide, dataset: Dataset) -> list[tuple[Cause, Term]]:
     """Find the terms of causes on one plant; bad readings have none."""
-    by_name = {(term.effect.name, _channel(term, side, dataset)): term for term in side.terms}
-    return [(c, by_name[c.effect, c.channel]) for c in causes if (c.effect, c.channel) in by_name]
+    by_key = {_key(term, side, dataset): term for term in side.terms}
+    return [(c, by_key[c.key]) for c in causes if c.key in by_key]

@@ -22,7 +22,8 @@ def wrong(simulate: Callable[[int, Experiment], np.ndarray], dataset: Dataset, s
     beginning where it is long; it returns rows n_init .. T-1 [N, ny].
     """
     experiments, simulated, samples = [], [], 0
-    for i, x in enumerate((*dataset.training.train, *dataset.training.valid)):
+    training = dataset.training.without_mere_starts()
+    for i, x in enumerate((*training.train, *training.valid)):
         if len(x) > dataset.n_init + 2 and samples < VIEW_SAMPLES:
             experiments.append(x[:VIEW_SAMPLES])
             simulated.append(simulate(i, experiments[-1]))

@@ -38,7 +38,8 @@ MORE_STEPS = 8  # until they are compared again
 Among = Literal["linear", "forecast", "own"]
 EVERY: tuple[Among, ...] = ("forecast", "own")  # linear ones are among the forecast
 # The models with one effect more than those of the key, by what was asked for, and the squares of the one before them.
-Extended = dict[tuple[frozenset[tuple[str, int]], Among], tuple[float, tuple[Estimate, ...]]]
+Key = tuple[frozenset[tuple[str, int, type]], Among]
+Extended = dict[Key, tuple[float, tuple[Estimate, ...]]]
 # Of the squares that a model had when effects were added to it: where a fit from elsewhere has less, they are anew.
 CLEARLY_LESS = 0.98
 
@@ -83,9 +84,9 @@ def _is_among(term: Term, among: Among) -> bool:
     return term.effect.linear if among == "linear" else bool(term.effect.own) == (among == "own")
 
 
-def key_of(terms: Sequence[Term], among: Among) -> tuple[frozenset[tuple[str, int]], Among]:
-    """Return what the models with one effect more than these are remembered by."""
-    return frozenset(term.key for term in terms), among
+def key_of(terms: Sequence[Term], among: Among) -> Key:
+    """Return what the models with one effect more than these are remembered by; an effect may have several laws."""
+    return frozenset((*term.key, type(term.effect)) for term in terms), among
 
 
 def known_fits(extended: Extended, terms: Sequence[Term]) -> list[Estimate]:

@@ -209,7 +209,7 @@ class Evidence:
         """2 (log L_max - log L) over values of each parameter, everything else fitted anew, of independent errors."""
         fitted, selection = self.identified.plant, self.selection
         estimate, records = fitted.estimate, fitted.records
-        if records.samples > ENOUGH:
+        if records.samples > ENOUGH or fitted.known_uncertainty is not None:  # or it was fitted to pieces
             estimate, records = selection.trial.estimate, selection.baseline.train
         plant = estimate.plant
         if term not in plant.terms or term in plant.per_experiment:

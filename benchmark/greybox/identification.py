@@ -54,6 +54,7 @@ class Identified:
 
 def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
     """Select effects (or none) on excerpts of the training data, then fit the model to all of it, plant by plant."""
+    data = data.without_mere_starts()
     channels, experiments = with_velocity(data), data.train + data.valid
     identified = []
     for outputs in plants_of(channels):

@@ -49,12 +49,14 @@ def look_for_more(estimate: Estimate, records: Records) -> Leftover:
     x, v = problem.simulator.motion(estimate.theta, estimate.local)  # [E, T]
     driven = records.u if plant.machine is None else records.u[:, :, [plant.machine.of_drive]]
     names, phi = library(plant, x, v, driven)
-    plain = Plant(plant.kind, order, len(names), plant.dt, zeros=plant.zeros, two_outputs=plant.two_outputs,
+    zeros = 0 if plant.imposed else plant.zeros  # of an imposed motion they belong to the damper, not to forces
+    plain = Plant(plant.kind, order, len(names), plant.dt, zeros=zeros, two_outputs=plant.two_outputs,
                   joint=plant.joint)  # fmt: skip
     simulator = Simulator(plain, np.ascontiguousarray(phi))
     theta = np.zeros(plain.size)
     for part in ("poles", "zeros", "velocity") if plant.machine is None else ():
-        theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
+        if plain.zeros or part != "zeros":
+            theta[getattr(plain.layout, part)] = estimate.theta[getattr(plant.layout, part)]
     if plant.machine is not None:  # as linear as it is where it hangs
         theta[: plant.order] = -dynamics.matrix(plant, estimate.theta)[-1, ::-1]
     thetas = np.repeat(theta[None], len(names), axis=0)

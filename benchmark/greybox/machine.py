@@ -169,6 +169,7 @@ def machine_of(channels: Channels, u: Float[np.ndarray, "E T nu"]) -> Machine:
     moments, _ = bare.moments(u, theta)
     moments = moments - theta[INERTIA] * (known.inertia is None)
     drive = bare.column(u, known.supply, 1.0) * (bare.column(u, known.gain, 1.0) if known.controlled else 1.0)
+    drive = drive[drive > 0] if np.any(drive > 0) else np.ones(1)  # some logs begin before the power is on
     alike = bool(np.ptp(moments) <= 1e-9 * abs(moments).max())
     return Machine(known, names, (force, unit), float(np.median(moments)), float(np.median(drive)), alike)
 

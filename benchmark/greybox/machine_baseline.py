@@ -39,6 +39,7 @@ def find_machine_baseline(
     records = Records.of(chosen, outputs)
     # What the search does not see of the training runs judges it too: few validation runs know few conditions.
     unseen = spread([x for x in train if not any(x is one for one in chosen)], HELD_OUT_SAMPLES)
+    unseen = [x for x in unseen if not any(_overlap(x, one) for one in chosen)]
     held_out = Records.of([*spread(valid), *unseen], outputs) if valid or unseen else records
     machine = machine_of(channels, Records.of(train, outputs).u[:, :1])
     kind = channels.outputs[outputs[0]].kind
@@ -73,6 +74,12 @@ def spread(experiments: Sequence[Experiment], samples: int = SEARCH_SAMPLES) -> 
     if len(experiments) <= wanted:
         return list(experiments)
     return [experiments[i] for i in np.unique(np.linspace(0, len(experiments) - 1, wanted).round().astype(int))]
+
+
+def _overlap(one: Experiment, other: Experiment) -> bool:
+    """Tell whether two pieces are of one run and share samples."""
+    apart = abs(one.since - other.since) > one.dt * (len(one if one.since < other.since else other) - 0.5)
+    return one.name == other.name and not apart
 
 
 def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -> Estimate:

@@ -128,6 +128,9 @@ def check_records(
                     f"{where}: {called}: the column {short(column)} {what} in {x.name}; "
                     f"{key} must be one positive number in each experiment"
                 )
+    on = [x.u[:, names.index(plant.enabled)].any() for x in experiments] if plant.enabled else [True]
+    if not any(on):
+        raise UnusableInput(f"{where}: {called}: the column {short(plant.enabled)} is 0 throughout, so nothing drives")
     for x in experiments if plant.enabled else ():
         if not np.isin(x.u[:, names.index(plant.enabled)], (0.0, 1.0)).all():
             raise UnusableInput(

@@ -117,6 +117,8 @@ def test_a_copy_is_no_repeated_run_nor_is_one_from_elsewhere_or_with_another_inp
     other = Experiment("other", 1.05 * two.u, two.y, two.dt)
     assert repeated([one, one, elsewhere, other], 20) == []
     assert repeated([one, elsewhere, two, other], 20) == [[0, 2]]
+    still = Experiment("still", 0 * one.u, one.y, one.dt)
+    assert repeated([still, Experiment("small", 1e-3 * one.u / np.std(one.u), one.y + 1e-9, one.dt)], 20) == []
 
 
 def test_the_variance_between_two_runs_is_not_biased():

@@ -1,5 +1,7 @@
 """Records on which nothing can be named: they show the controller, or no model beats their mean."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,15 @@ def test_nothing_is_named_where_the_mean_is_the_better_model(levels, said):
     answer = diagnose(Dataset("unrelated", training, (test,), 10, channels), views_too=False)
     assert not answer.causes
     assert any("better than its mean" in sentence and said in sentence for sentence in answer.findings.doubts)
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0])
+def test_an_output_that_never_moves_is_said_to_stand_still(level):
+    rng = np.random.default_rng(0)
+    *train, valid, test = [unrelated(rng, f"e{i}", np.zeros(1)) for i in range(5)]
+    still = [replace(x, y=np.full_like(x.y, level)) for x in (*train, valid, test)]
+    channels = Channels((Channel("u", "V"),), (Channel("y", "m", "position"),))
+    training = TrainingSet(tuple(still[:3]), (still[3],), 10, channels)
+    answer = diagnose(Dataset("still", training, (still[4],), 10, channels), views_too=False)
+    assert not answer.causes
+    assert any("y never moves. Check the sensor" in sentence for sentence in answer.findings.doubts)

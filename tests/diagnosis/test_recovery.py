@@ -123,3 +123,17 @@ def test_the_summary_counts_what_was_named_and_the_picture_is_drawn(tmp_path):
     assert figures["failed, left out"] == "1"
     confusion.picture(rows, tmp_path / "matrix.png")
     assert (tmp_path / "matrix.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("named", "confounded", "right"),
+    [
+        (("coulomb_friction", "dead_zone"), ((), ()), True),
+        (("coulomb_friction", "backlash"), ((), ("dead_zone",)), True),
+        (("coulomb_friction",), (("dead_zone",),), False),
+        (("backlash", "stiction"), (("coulomb_friction", "dead_zone"), ()), False),
+    ],
+)
+def test_each_of_two_hidden_effects_needs_an_answer_of_its_own(named, confounded, right):
+    case = Case("stage", "coulomb_friction,dead_zone", 1.0, 0.02, 0.0, 0)
+    assert CaseResult(case, verdict="named", named=named, confounded=confounded).right is right

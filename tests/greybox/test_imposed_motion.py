@@ -5,8 +5,10 @@ import pytest
 from scipy.signal import lfilter
 
 from simgap.diagnosis.diagnose import diagnose
+from simgap.greybox.linear import find_baseline
 from simgap.records import Channel, Channels, Dataset, TrainingSet
 
+from .building import share_left_over
 from .parts import experiments
 
 DT = 0.01
@@ -130,3 +132,10 @@ def test_what_a_velocity_only_drives_keeps_its_poles():
     answer = diagnose(of_velocity(lambda v: lfilter([0.0, 1 - decay], [1.0, -decay], 0.1 * v), seed=3), views_too=False)
     assert not answer.causes
     assert answer.to_json()["baseline"]["order"] > 0
+
+
+def test_what_a_missing_force_leaves_of_an_imposed_motion_is_seen_undifferentiated():
+    training = dataset(lambda x, begin: 2.0 * x + 30.0 * np.sign(np.gradient(x)), seed=3).training
+    plain = find_baseline(training.train, training.valid, training.channels, (0,), 10)
+    assert plain.plant.imposed
+    assert share_left_over(plain) > 0.5

@@ -10,7 +10,7 @@ from simgap.data.simulated.rigs import hide, physical
 from simgap.data.simulated.rigs.plants import RIGS
 from simgap.diagnosis.diagnose import diagnose
 from simgap.greybox.additions import extend
-from simgap.greybox.machine import INERTIA, NAMES
+from simgap.greybox.machine import INERTIA, NAMES, machine_of
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.terms import Term
 from simgap.records import Channel, Channels, Experiment
@@ -171,3 +171,11 @@ def test_a_grey_box_with_an_effect_by_name_knows_the_machine():
     plant = model.plants[0].estimate.plant
     assert plant.machine is not None
     assert np.std(model.plants[0].estimate.errors) < 0.01 * np.std(model.plants[0].records.y)
+
+
+def test_a_log_that_begins_before_the_power_is_on_has_a_drive_all_the_same():
+    columns = (*CHANNELS.inputs, Channel("volts", "V"))
+    channels = known(Channels(columns, CHANNELS.outputs), TABLE | {"supply": "volts"})
+    first = np.array([[[0.0, 1.0, 8.0, 0.5, 0.1, volts]] for volts in (0.0, 0.0, 12.0)])
+    assert machine_of(channels, first).drive == 12.0 * 8.0
+    assert math.isfinite(machine_of(channels, first[:1]).largest_gain(DT))
