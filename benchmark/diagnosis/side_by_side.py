@@ -41,6 +41,7 @@ class SideBySide:
     simulation: Estimate
     theirs: tuple[Term, ...]
     error: Float[np.ndarray, "E T ny"]  # of the simulation on training data, in units of the noise; 0 where unknown
+    variance: Float[np.ndarray, " ny"]  # of what was simulated there
 
     @classmethod
     def of(cls, machine: FittedPlant, dataset: Dataset, simulated: Dataset, seed: int) -> SideBySide:
@@ -57,7 +58,8 @@ class SideBySide:
                 machine = _with_more(machine, more)
                 simulation = min(simulation, _fit(machine, experiments), key=lambda fit: fit.squares)
         simulation = _without_superfluous(machine, simulation, experiments, own, REPEATED * squares)
-        return cls(machine, own, simulation, simulation.plant.terms, error)
+        simulated_y = Records.of(experiments, machine.outputs).y[machine.records.mask]
+        return cls(machine, own, simulation, simulation.plant.terms, error, np.var(simulated_y, axis=0))
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -114,8 +116,7 @@ class SideBySide:
     def unlike(self) -> float:
         """Share of the simulation's variance that its model does not repeat."""
         records, errors = self.machine.records, self.simulation.errors
-        variance = np.var(records.y[records.mask], axis=0)  # [ny]
-        return float(np.max(np.mean(errors[records.mask] ** 2, axis=0) / np.maximum(variance, 1e-300)))
+        return float(np.max(np.mean(errors[records.mask] ** 2, axis=0) / np.maximum(self.variance, 1e-300)))
 
     def corrected(self, parts: Collection[Term | None]) -> FittedPlant:
         """Return the simulation's plant with some effects, and the linear part (None), as the machine has them."""

@@ -102,6 +102,21 @@ def test_a_dropped_record_is_corrected_and_diagnosed_and_its_model_simulates(tab
     assert page.get_by_label("Unit of v").input_value() == "m/s"  # what was said is still there
 
 
+def test_an_uneven_record_is_interpolated_where_that_is_asked_for(tab, tmp_path):
+    write_cart(tmp_path / "cart.csv", samples=60)
+    lines = (tmp_path / "cart.csv").read_text().splitlines()
+    lines[30] = "2.93" + lines[30][lines[30].index(",") :]
+    (tmp_path / "cart.csv").write_text("\n".join(lines))
+    page = tab()
+    choose(page, tmp_path / "cart.csv")
+    say(page, "input", "output", "velocity")
+    page.get_by_role("button", name="Diagnose").click()
+    page.get_by_text("Say the sampling time in seconds").wait_for()
+    page.get_by_label("Interpolate onto an even grid of").fill("0.1")
+    page.get_by_role("button", name="Diagnose").click()
+    page.get_by_role("link", name="Take the model away").wait_for()
+
+
 def test_a_bad_cell_gets_the_sentence_of_the_command_line(tab, tmp_path):
     write_cart(tmp_path / "bad.csv", samples=50)
     lines = (tmp_path / "bad.csv").read_text().splitlines()

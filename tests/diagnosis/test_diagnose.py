@@ -2,6 +2,7 @@
 
 import json
 import secrets
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -193,3 +194,17 @@ def test_a_load_that_comes_and_goes_in_every_record_is_named():
 def test_a_disturbance_of_the_same_phase_in_every_record_is_no_swing_of_the_plant():
     found = diagnose(hide("cart", {"periodic_disturbance": 1.0}, noise=0.05)).findings
     assert [cause.effect for cause in found.causes] == ["periodic_disturbance"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("zero", [-200.0, 1000.0])
+def test_a_sensor_whose_zero_is_far_away_hides_no_friction_and_invents_no_force(zero):
+    data = hide("stage", {"coulomb_friction": 1.0}, noise=0.02, seed=3)  # moves by some 4 mm around its spring's rest
+    far = [
+        tuple(replace(x, y=x.y + zero) for x in part) for part in (data.training.train, data.training.valid, data.test)
+    ]
+    training = replace(data.training, train=far[0], valid=far[1])
+    answer = diagnose(replace(data, training=training, test=far[2], sha256=""), views_too=False)
+    assert answer.findings.verdict == "named"
+    assert [cause.effect for cause in answer.causes] == ["constant_load", "coulomb_friction"]
+    assert answer.causes[1].parameters[0].value == pytest.approx(50.0, rel=0.05)

@@ -38,11 +38,18 @@ class ConstantLoad(ForceEffect):
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the force."""
-        return (Parameter("force", scales.force_unit, -20 * scales.force_rms, 20 * scales.force_rms),)
+        largest = max(20 * scales.force_rms, 3 * abs(self._held(scales)))
+        return (Parameter("force", scales.force_unit, -largest, largest),)
 
     def starts(self, scales: SignalScales) -> list[Start]:
-        """Start from a small force; its amplitude, and so its sign, is then estimated."""
-        return [Start((0.1 * scales.force_rms,), amplitude=0)]
+        """Start from a small force, its size and sign estimated then; far from zero, from one that holds it there."""
+        small = [Start((0.1 * scales.force_rms,), amplitude=0)]
+        return [*small, Start((self._held(scales),))] if scales.y_low * scales.y_high > 0 else small
+
+    @staticmethod
+    def _held(scales: SignalScales) -> float:
+        """Estimate the force that holds a plant with a spring where it is, from what moves it about there."""
+        return scales.force_rms * 0.5 * (scales.y_low + scales.y_high) / (scales.y_rms or 1.0)
 
     def applies_to(self, scales: SignalScales) -> bool:
         """Tell whether the plain model lacks an operating point that is fitted."""
