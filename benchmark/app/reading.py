@@ -57,7 +57,8 @@ def told(seen: Look, inputs: Sequence[str], outputs: Sequence[str], kinds: str |
     of_outputs = dict.fromkeys(role["output"], kinds) if isinstance(kinds, str) else kinds or {}
     if unknown := sorted(set(of_outputs.values()) - set(KINDS)):
         raise UnusableInput(f"kind {unknown[0]!r}: use one of {', '.join(KINDS)}")
-    return Settings(*role.values(), kinds={heading(name): kind for name, kind in of_outputs.items()})
+    kinds = {heading(name): kind for name, kind in of_outputs.items()}
+    return Settings(role["input"], role["output"], role["simulated"], kinds=kinds)
 
 
 def dataset_of(source: str, settings: Settings) -> Reading:
