@@ -18,6 +18,7 @@ from simgap.cli.options import (
     model_faults,
     parse_params,
     read_data,
+    refuse,
 )
 from simgap.records import UnusableInput
 
@@ -67,8 +68,7 @@ def export(
         records: Any = data
         if exports.is_saved(model):
             given = {"input": inputs, "output": outputs, "kind": kind, "param": param, "seed": seed}
-            if said := [name for name, value in given.items() if value]:
-                raise UnusableInput(f"--{said[0]}: {model} is a saved model, which is not fitted again; leave it out")
+            refuse(given, f"{model} is a saved model, which is not fitted again; leave it out")
         else:
             exports.check_model(model, to)
             records = read_data(data, inputs, outputs, dt, kind, resample, split_gaps).dataset

@@ -48,6 +48,12 @@ def names(text: str | None) -> list[str] | None:
     return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
+def refuse(given: dict[str, Any], why: str) -> None:
+    """Raise UnusableInput for the first of these options that was given, by its name without the dashes."""
+    if named := [name for name, value in given.items() if value]:
+        raise UnusableInput(f"--{named[0]}: {why}")
+
+
 def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
     """["na=3"] as {"na": 3}, with the types of TOML. Raises UnusableInput."""
     params = {}

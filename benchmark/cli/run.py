@@ -16,10 +16,10 @@ from simgap.cli.options import (
     SplitGaps,
     check_writable,
     names,
+    refuse,
     write_json,
 )
 from simgap.cli.progress import shown
-from simgap.records import UnusableInput
 
 if TYPE_CHECKING:
     from simgap.records import Result
@@ -55,10 +55,9 @@ def run(
     if suite == STUDY:
         from simgap.cli import recovery
 
-        refused = {"models": models, "model": model, "input": inputs, "output": outputs, "dt": dt,
-                   "resample": resample, "split-gaps": split_gaps}  # fmt: skip
-        if given := [name for name, value in refused.items() if value]:
-            raise UnusableInput(f"--{given[0]}: the recovery study takes none; --datasets names its rigs")
+        given = {"models": models, "model": model, "input": inputs, "output": outputs, "dt": dt,
+                 "resample": resample, "split-gaps": split_gaps}  # fmt: skip
+        refuse(given, "the recovery study takes none; --datasets names its rigs")
         recovery.run(names(datasets) or [], 1 if seeds is None else seeds, engine, jobs, address, out, json)
         return
     from rich.console import Console

@@ -19,7 +19,7 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
     samples = sum(map(len, training.train))
     if samples < SHORT:
         sentences.append(f"There are only {samples} training samples: weak effects cannot be told from noise.")
-    if not any(len(x) > training.n_init for x in training.valid):
+    if not training.without_mere_starts().valid:
         sentences.append("There are no validation data: effects were accepted on the training data alone.")
     if len(training.train) == 1:
         sentences.append(

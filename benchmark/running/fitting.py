@@ -153,7 +153,7 @@ def validation_error(model: Model, training: TrainingSet) -> float | None:
 
     It is what the model says that it is, where only a cross-validation can tell.
     """
-    if not any(len(x) > training.n_init for x in training.valid):
+    if not training.without_mere_starts().valid:
         return None
     if isinstance(own := getattr(model, "held_out_error", None), float):
         return own if math.isfinite(own) else None

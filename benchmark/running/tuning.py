@@ -116,7 +116,7 @@ def tune(
     given = params or {}
     if not ranges or seconds <= 0 or seeds < 1:
         raise UnusableInput("tuning needs a range, such as units=8:64, a time above zero and at least one seed")
-    if not any(len(x) > dataset.n_init for x in dataset.training.valid):
+    if not dataset.training.without_mere_starts().valid:
         raise UnusableInput(f"{dataset.name} has no validation data that are longer than {dataset.n_init} samples")
     check_params(model, given | {one.name: one.choices[0] if one.choices else one.low for one in ranges})
     end = time.monotonic() + seconds
