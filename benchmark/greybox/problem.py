@@ -126,14 +126,17 @@ class Problem:
         return values if self._measured is None else np.where(self._measured, values, 0.0)
 
     def jacobian(self, theta: np.ndarray, local: np.ndarray, which: np.ndarray) -> Jacobian:
-        """Differentiate the simulation by forward differences, for the parameters `which` of theta."""
+        """Differentiate the simulation by forward differences, for the parameters `which` of theta.
+
+        Of readings in steps, by those without: small changes would move none of them, or one by a whole step.
+        """
         which, own = np.flatnonzero(which), np.arange(self.plant.n_local)
         steps = np.concatenate((self._steps(theta, len(local), which), self._steps_of_own(local)))  # [S, E]
         thetas = np.repeat(theta[None], 1 + len(steps), axis=0)
         locals_ = np.repeat(local[None], len(thetas), axis=0)
         thetas[1 + np.arange(len(which)), which] += steps[: len(which), 0]
         locals_[1 + len(which) + own, :, own] += steps[len(which) :]
-        here, *_ = y = self.simulator.run_many(thetas, locals_)  # [1 + S, E, T, ny]
+        here, *_ = y = self.simulator.run_many(thetas, locals_, steps=False)  # [1 + S, E, T, ny]
         with np.errstate(invalid="ignore", over="ignore"):  # of simulations that grow without bound
             change = y[1:] - here
             change /= steps[:, :, None, None]

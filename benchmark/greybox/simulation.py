@@ -215,9 +215,12 @@ class Simulator:
         return self.run_many(theta[None], local[None])[0]
 
     def run_many(
-        self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"]
+        self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"], *, steps: bool = True
     ) -> Float[np.ndarray, "S E T ny"]:
-        """Simulate with several parameter vectors; those that differ in what only sensors do share their states."""
+        """Simulate with several parameter vectors; those that differ in what only sensors do share their states.
+
+        Without `steps`, no sensor reads in any.
+        """
         plant = self.plant
         moving, starts = thetas[:, plant.moves_states], locals_[:, :, : plant.n_moving]
         keys = [of_run.tobytes() + start.tobytes() for of_run, start in zip(moving, starts, strict=True)]
@@ -233,13 +236,18 @@ class Simulator:
             read(states_known, states, which, readings, y)
             if self._has_sensors:
                 for of_run in zip(thetas, locals_, y, strict=True):
-                    self._pass_sensors(*of_run)
+                    self._pass_sensors(*of_run, steps=steps)
         # The Jacobian is asked for where a fit has just been.
         self._known = keys[0], states[which[0], None] if which[0] >= 0 else states_known
         return y
 
     def _pass_sensors(
-        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], y: Float[np.ndarray, "E T ny"]
+        self,
+        theta: Float[np.ndarray, " p"],
+        local: Float[np.ndarray, "E q"],
+        y: Float[np.ndarray, "E T ny"],
+        *,
+        steps: bool,
     ) -> None:
         """Let the sensors' effects act on the outputs, in place."""
         plant = self.plant
@@ -249,7 +257,7 @@ class Simulator:
                 if term.effect.own:
                     shapes = term.effect.shapes(self.t, self._duration, p)
                     y[:, :, channel] += local[:, plant.own_part_of(term)] @ shapes
-                else:
+                elif steps or not term.effect.in_steps:
                     y[:, :, channel] = self._read(term, y[:, :, channel], p, local)
 
     def _read(

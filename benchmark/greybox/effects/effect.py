@@ -112,6 +112,8 @@ class Effect(ABC):
     visible_in_readings: ClassVar[bool] = False
     # A reading does not tell on which side of zero the quantity is.
     hides_sign: ClassVar[bool] = False
+    # It makes steps of what grows evenly: its slope is zero or infinite, and one on average.
+    in_steps: ClassVar[bool] = False
 
     # Functions that the term, or the step, calls.
     helpers: ClassVar[tuple[Callable[..., float], ...]] = ()

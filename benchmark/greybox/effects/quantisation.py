@@ -23,6 +23,7 @@ class Quantisation(OutputEffect):
     reference: ClassVar[str] = "Widrow and Kollar, Quantization Noise, 2008, ch. 4"
     place_in_chain: ClassVar[int] = 140
     shows_in: ClassVar[tuple[ViewName, ...]] = ("position", "velocity", "value", "level")
+    in_steps: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return the step, which is read off the data and not estimated."""
