@@ -39,7 +39,7 @@ class GreyBox(GreyBoxModel):
         chosen: list[tuple[Estimate, Baseline]] = []
         named = [self.effects] if isinstance(self.effects, str) else self.effects
         placed = [_place(name, data) for name in named]
-        for outputs in plants_of(data.channels):
+        for outputs in plants_of(data, data.channels):
             find = find_baseline if data.channels.plant is None else find_machine_baseline
             baseline = find(data.train, data.valid, data.channels, outputs, data.n_init)
             estimate = baseline.estimate
@@ -78,14 +78,14 @@ def _place(name: str, data: TrainingSet) -> tuple[Effect, tuple[int, ...] | None
     if not channel and isinstance(effect, InputEffect) and known is not None and known.controlled:
         return effect, None, len(inputs) if effect.on_command else names_of(inputs).index(known.input)
     if not channel:
-        return effect, None if effect.port == "input" else plants_of(data.channels)[0], 0
+        return effect, None if effect.port == "input" else plants_of(data, data.channels)[0], 0
     names = names_of(inputs if effect.port == "input" else outputs)
     if channel not in names:
         raise UnusableInput(f"{name}:{channel}: there is no such {effect.port}; known are {', '.join(names)}")
     at = names.index(channel)
     if effect.port == "input":
         return effect, None, at
-    plant = next(plant for plant in plants_of(data.channels) if at in plant)
+    plant = next(plant for plant in plants_of(data, data.channels) if at in plant)
     return effect, plant, plant.index(at) if effect.port == "output" else 0
 
 

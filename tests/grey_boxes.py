@@ -9,7 +9,7 @@ from simgap.records import TrainingSet
 def plain_grey_box(data: TrainingSet) -> GreyBoxModel:
     """The plain linear model of each plant, fitted to all training data."""
     plants = []
-    for outputs in plants_of(data.channels):
+    for outputs in plants_of(data, data.channels):
         baseline = find_baseline(data.train, data.valid, data.channels, outputs, data.n_init)
         plants.append(FittedPlant.fit(baseline.estimate, baseline, data.train + data.valid))
     return GreyBoxModel(plants)

@@ -57,7 +57,7 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
     data = data.without_mere_starts()
     channels, experiments = with_velocity(data), data.train + data.valid
     identified = []
-    for outputs in plants_of(channels):
+    for outputs in plants_of(data, channels):
         output = outputs[0]
         stage(f"Fitting the plain linear model of {channels.outputs[output].name}")
         unsaid = effects and channels.outputs[output].kind_from == "unknown"
@@ -69,7 +69,7 @@ def identify(data: TrainingSet, effects: bool = True) -> list[Identified]:
             stage("Comparing with linear models of other orders")
             selection = of_better_joint(of_better_order(selection, of_kind), of_kind)
             selection = with_inner_filter(selection, of_kind)
-            linear = linear_rival(data, of_kind, selection)
+            linear = linear_rival(of_kind, selection)
             if linear is not None and (swinging := of_several_masses(linear.baseline, selection, of_kind)):
                 selection, linear = swinging, None
         plant = FittedPlant.fit(*_chosen(selection, linear), experiments)

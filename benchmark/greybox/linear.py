@@ -60,33 +60,41 @@ def find_baseline(
     records = Records.of(chosen, outputs)
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = is_cut(chosen, train)
-    kind = channels.outputs[outputs[0]].kind
-    by_rate = kind == "other" and [channel.kind for channel in channels.inputs] == ["velocity"]
-    models, orders = plain_models(records, held_out, kind, n_init, by_rate)
+    models, orders = plain_models(records, held_out, channels, outputs, n_init)
     stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
     outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)
         held_out = without_outliers(held_out, errors_on(models[-1], held_out, n_init), outliers) if valid else records
-        models, orders = plain_models(records, held_out, kind, n_init, by_rate)
+        models, orders = plain_models(records, held_out, channels, outputs, n_init)
+    plain = scaled(models[-1], records, channels, outputs)
+    return _simplest(
+        Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders), models, channels
+    )
 
-    def baseline_of(plain: Estimate) -> Baseline:
-        plain = scaled(plain, records, channels, outputs)
-        return Baseline(records, held_out, tuple(outputs), plain, n_init, cut, tuple(outliers), orders)
 
-    baseline = baseline_of(models[-1])
+def as_other(baseline: Baseline, channels: Channels) -> Baseline:
+    """Fit the plain linear model of the same readings again, of outputs of another kind."""
+    models, orders = plain_models(baseline.train, baseline.valid, channels, baseline.outputs, baseline.n_init)
+    return _simplest(with_plain(replace(baseline, orders=orders), models[-1], channels), models, channels)
+
+
+def _simplest(baseline: Baseline, models: Sequence[Estimate], channels: Channels) -> Baseline:
+    """Take a simpler plain model where an effect of fewer numbers does as well; ask whether the input is held."""
     held_out_errors = cache(baseline.held_out_errors)  # of orders that many candidates are compared with
     for simpler in (fit for fit in models[:-1] if fit.plant.by_rate or not fit.plant.zeros):
         # A higher order is no answer where a delay or another law of the plant, which cost less, do as well.
-        other = baseline_of(simpler)
+        other = with_plain(baseline, simpler, channels)
         instead = [term for term in candidates(other) if _instead_of_order(term, other.plant)]
         if any(
             _takes_its_place(fit, simpler, baseline, held_out_errors) for term in instead for fit in _laws(other, term)
         ):
             baseline = other
             break
-    smooth = None if baseline.plant.imposed else first_order_hold(baseline.estimate, records, held_out, n_init)
-    return baseline if smooth is None else baseline_of(smooth)
+    if baseline.plant.imposed:
+        return baseline
+    smooth = first_order_hold(baseline.estimate, baseline.train, baseline.valid, baseline.n_init)
+    return baseline if smooth is None else with_plain(baseline, smooth, channels)
 
 
 def _laws(baseline: Baseline, term: Term) -> Iterator[Estimate]:
@@ -150,14 +158,15 @@ def _instead_of_order(term: Term, plant: Plant) -> bool:
 
 
 def plain_models(
-    train: Records, valid: Records, kind: Kind, n_init: int, by_rate: bool = False
+    train: Records, valid: Records, channels: Channels, outputs: Sequence[int], n_init: int
 ) -> tuple[list[Estimate], tuple[Estimate, ...]]:
     """Fit plain linear models: order 1 for a velocity, 2 for a position, else up to what held-out data ask for.
 
     The last one of the list is the simplest whose held-out error is within a standard error of the best, and the ones
-    before it are simpler; beside it stand all that were tried. An input that is a velocity, `by_rate`, may be that of a
-    motion which takes a force.
+    before it are simpler; beside it stand all that were tried. An only input that is a velocity may be that of a motion
+    which takes a force.
     """
+    kind = channels.outputs[outputs[0]].kind
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
         plant = Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2)
@@ -184,7 +193,9 @@ def plain_models(
             tried += here
         if rounds_in_vain == 2:
             break
-    if by_rate:  # beside them all: what it simulates worse or better says nothing of the next order
+    if kind == "other" and [channel.kind for channel in channels.inputs] == [
+        "velocity"
+    ]:  # beside them all: what it simulates worse or better says nothing of the next order
         fit = fit_plain(Plant(kind, 0, nu, dt, zeros=1, offset=True, by_rate=True), train)
         tried.insert(0, (fit, block_errors(fit, valid, n_init, train)))
     fits = tuple(fit for fit, _ in tried)  # from the simplest on

@@ -16,12 +16,12 @@ from simgap.greybox.effects.periodic_disturbance import PeriodicDisturbance
 from simgap.greybox.effects.sensor_drift import SteadySensorDrift
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
-from simgap.greybox.linear import WORTH_AN_ORDER, find_baseline, with_plain
+from simgap.greybox.linear import WORTH_AN_ORDER, as_other, with_plain
 from simgap.greybox.position_and_velocity import with_kind
 from simgap.greybox.search import BETTER
 from simgap.greybox.selection import Selection
 from simgap.greybox.trial import CONSISTENT, HALVES_LEAVE, MATTERS_AT_ALL, halves_speak_for, score_gain
-from simgap.records import Channels, TrainingSet
+from simgap.records import Channels
 
 # Of what linear effects take of the error: what a free linear model may take beyond them.
 BEYOND = 0.1
@@ -43,7 +43,7 @@ class LinearRival:
         return cls(linear, "no more" if gain.mean() >= 0 else "clearly more" if in_most(-gain) else "more")
 
 
-def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) -> LinearRival | None:
+def linear_rival(channels: Channels, selection: Selection) -> LinearRival | None:
     """Fit a linear model of as many poles, zeros and lags as held-out data ask for; None where the effects do better.
 
     What is nonlinear must score higher than that, and err no more in most held-out blocks; or leave less than half of
@@ -59,8 +59,7 @@ def linear_rival(data: TrainingSet, channels: Channels, selection: Selection) ->
         return None
     if plain.plant.kind == "other":
         return _of_tried_order(selection, channels)
-    whole = data.train, data.valid, with_kind(channels, output, "other"), (output,), data.n_init
-    linear = find_baseline(*whole, every_reading=not plain.outliers)
+    linear = as_other(plain, with_kind(channels, output, "other"))
     if moves_by_itself_as(linear.estimate, chosen, plain.train.duration):
         return None
     if _linear_or_visible(chosen):

@@ -9,9 +9,11 @@ from jaxtyping import Float
 from scipy.signal import detrend
 
 from simgap.records import Channels, Kind, TrainingSet
+from simgap.units import of_motion
 
-# Share of a position that the integral of its velocity explains at least, with what noise and sensors add to both.
-INTEGRAL = 0.8
+# Share of a position that the integral of its velocity explains at least, with what noise and sensors add to both;
+# and where it is known what each is, but not whether both are of one body.
+INTEGRAL, OF_ONE_BODY = 0.8, 0.5
 # Share of the rest that a leak of the position explains at most; else it follows the other signal with a lag.
 LEAK = 0.5
 FAR = 5.0  # standard deviations: a rest that is larger is a bad reading
@@ -43,13 +45,13 @@ def with_velocity(data: TrainingSet) -> Channels:
     return channels
 
 
-def integral_share(data: TrainingSet, position: int, velocity: int) -> float:
+def integral_share(data: TrainingSet, position: int, velocity: int, lags: bool = False) -> float:
     """Compute the share of x that its velocity explains; zero where the two are no such pair.
 
         x = x0 + b t + g int v dt,   g > 0
 
     The trend b is the offset of a sensor, g a matter of units; a sine is its own second derivative, but with g < 0. A
-    signal behind a lag, x' = g v - a x, asks for the integral of x too.
+    signal behind a lag, x' = g v - a x, asks for the integral of x too, and is no position unless it `lags` for sure.
     """
     signals = [
         np.stack([detrend(x.y[:, position]), detrend(_integral(x.y[:, velocity], x.dt)),
@@ -67,7 +69,11 @@ def integral_share(data: TrainingSet, position: int, velocity: int) -> float:
     rest, gains = _regress(x, of_v[:, None])
     behind_lag, _ = _regress(x, np.stack((of_v, of_x), axis=1))
     leaks = rest @ rest - behind_lag @ behind_lag > LEAK * (rest @ rest)
-    return 0.0 if gains[0] <= 0 or (leaks and rest @ rest > 1e-6 * (x @ x)) else float(1 - rest @ rest / (x @ x))
+    return (
+        0.0
+        if gains[0] <= 0 or (not lags and leaks and rest @ rest > 1e-6 * (x @ x))
+        else float(1 - rest @ rest / (x @ x))
+    )
 
 
 def _integral(v: Float[np.ndarray, " N"], dt: float) -> Float[np.ndarray, " N"]:
@@ -81,10 +87,20 @@ def _regress(
     return y - features @ gains, gains
 
 
-def plants_of(channels: Channels) -> list[tuple[int, ...]]:
-    """List the outputs of each plant: a position with its velocity, where there is one of each; else each alone."""
+def plants_of(data: TrainingSet, channels: Channels) -> list[tuple[int, ...]]:
+    """List the outputs of each plant: the only position with the only velocity, if that is its own; else each alone.
+
+    That it is, their units say, or else the readings.
+    """
     kinds = [channel.kind for channel in channels.outputs]
-    if kinds.count("position") == 1 and kinds.count("velocity") == 1:
-        pair = (kinds.index("position"), kinds.index("velocity"))
+    pair = tuple(kinds.index(kind) for kind in ("position", "velocity") if kinds.count(kind) == 1)
+    if len(pair) == 2 and (
+        _same_motion(*(channels.outputs[i].unit for i in pair)) or integral_share(data, *pair, lags=True) >= OF_ONE_BODY
+    ):
         return [pair] + [(i,) for i in range(len(kinds)) if i not in pair]
     return [(i,) for i in range(len(kinds))]
+
+
+def _same_motion(position: str, velocity: str) -> bool:
+    """Tell whether both are units of lengths, or both of angles."""
+    return of_motion(position).kind == of_motion(velocity).kind != ""

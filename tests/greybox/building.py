@@ -222,7 +222,10 @@ def order_of(search):
 def orders_tried(train, valid, kind):
     """Orders of the plain models, the chosen one last, before any other law of the plant is tried."""
     ny = train[0].y.shape[1]
-    models, _ = linear.plain_models(Records.of(train, range(ny)), Records.of(valid, range(ny)), kind, 10)
+    outputs = range(ny)
+    models, _ = linear.plain_models(
+        Records.of(train, outputs), Records.of(valid, outputs), channels(kind, ny), outputs, 10
+    )
     return [model.plant.order for model in models]
 
 
@@ -243,7 +246,7 @@ def order_chosen(blocks_of, trained=None):
         return np.asarray(blocks_of[min(fit.plant.order, max(blocks_of))], dtype=float)
 
     with patch.object(linear, "fit_plain", fitted), patch.object(linear, "block_errors", errors):
-        return linear.plain_models(nothing, nothing, "other", 10)[0][-1].plant.order
+        return linear.plain_models(nothing, nothing, channels("other", 1), (0,), 10)[0][-1].plant.order
 
 
 def runs_on(search):

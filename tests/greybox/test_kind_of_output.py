@@ -8,7 +8,7 @@ import pytest
 from simgap.data.simulated.rigs import hide
 from simgap.greybox.identification import channels_of, identify
 from simgap.greybox.kind_of_output import settle
-from simgap.greybox.position_and_velocity import integral_share, with_velocity
+from simgap.greybox.position_and_velocity import integral_share, plants_of, with_velocity
 from simgap.records import Channel, Channels, Experiment, TrainingSet
 
 
@@ -44,6 +44,31 @@ def test_of_a_pair_that_is_half_known_the_other_half_is_seen():
     data = hide("slide", {}, seed=5)
     assert [c.kind for c in with_velocity(unsaid(data, "position", None)).outputs] == ["position", "velocity"]
     assert [c.kind for c in with_velocity(unsaid(data, None, "velocity")).outputs] == ["position", "velocity"]
+
+
+def test_a_position_and_its_velocity_are_one_plant_even_without_the_sign():
+    training = hide("slide", {"absolute_sensor": 1.0}, seed=5).training
+    assert plants_of(training, training.channels) == [(0, 1)]
+
+
+def test_the_position_of_one_body_and_the_velocity_of_another_are_two_plants():
+    training, other = (hide("slide", {}, seed=seed).training for seed in (5, 6))
+    train = tuple(
+        replace(one, y=np.stack((one.y[:, 0], two.y[:, 1]), axis=1))
+        for one, two in zip(training.train, other.train, strict=True)
+    )
+    training = replace(training, train=train, valid=())
+    position, velocity = training.channels.outputs
+    of_other = replace(training.channels, outputs=(position, replace(velocity, unit="rad/s")))
+    assert plants_of(training, of_other) == [(0,), (1,)]
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "V"])
+def test_a_position_and_its_velocity_are_one_plant_in_whatever_unit(unit):
+    training = hide("slide", {}, seed=5).training
+    position, velocity = training.channels.outputs
+    other = replace(training.channels, outputs=(position, replace(velocity, unit=unit)))
+    assert plants_of(training, other) == [(0, 1)]
 
 
 def test_what_is_written_is_never_changed():

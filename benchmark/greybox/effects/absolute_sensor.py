@@ -45,9 +45,9 @@ class AbsoluteSensor(OutputEffect):
         return [Start(())]
 
     def applies_to(self, scales: SignalScales) -> bool:
-        """Tell whether the input takes both signs while no reading is below zero, apart from noise."""
+        """Tell whether the input takes both signs, and readings come near zero and never below, apart from noise."""
         return (
-            scales.y_low > -0.4 * scales.y_high
+            abs(scales.y_low) < 0.4 * scales.y_high
             and scales.u_low < -0.2 * scales.u_max
             and scales.u_high > 0.2 * scales.u_max
         )
