@@ -9,11 +9,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from simgap.data.formats.folder import load_folder
 from simgap.data.formats.headings import find, listed
-from simgap.data.formats.logs import ENDINGS, is_described, logs_of, record_of_logs
+from simgap.data.formats.logs import ENDINGS, is_described, logs_of, not_read, record_of_logs
 from simgap.data.formats.one_record import Choices, dataset_of
 from simgap.data.formats.plant_table import with_known
 from simgap.data.formats.tables import Table
@@ -104,6 +104,8 @@ def read(
         )
         record = record_of_logs(read_tables(source, choices), choices)
         dataset, said = dataset_of(record, name or _name_of(Path(record.source))), record.said
+        if _is_folder(source):
+            said = (*said, *not_read(Path(source)))
     theirs = None
     if simulated:
         dataset, theirs = split_off(dataset, simulated)
@@ -174,9 +176,13 @@ def read_tables(source: Any, choices: Choices) -> list[Table]:
     """Read a DataFrame, a file, a list of files, or all logs of a folder. Raises UnusableInput."""
     if isinstance(source, list | tuple):
         return [read_table(log, choices) for log in _each_once(source)]
-    if isinstance(source, str | os.PathLike) and os.path.isdir(source):  # noqa: PTH112  # it never raises
+    if _is_folder(source):
         return [read_table(file, choices) for file in logs_of(Path(source))]
     return [read_table(source, choices)]
+
+
+def _is_folder(source: Any) -> TypeGuard[str | os.PathLike[str]]:
+    return isinstance(source, str | os.PathLike) and os.path.isdir(source)  # noqa: PTH112  # it never raises
 
 
 def _each_once(logs: Sequence[Any]) -> Sequence[Any]:

@@ -22,10 +22,14 @@ def page(template: str, **content: Any) -> str:
     return _environment().get_template(template).render(content, wording=wording, kinds=KINDS)
 
 
-def answer_bar(order: Order) -> str:
-    """Write what stands above a diagnosis in the app: what can be taken away, and the same on the command line."""
-    stem = Path(order.source).stem
-    return page("bar.html", name=Path(order.source).name, stem=stem, command=command(order.source, order.settings))
+def answer_bar(order: Order, reading: str) -> str:
+    """Write what stands above a diagnosis in the app: how the record was read, what can be taken away, and the command.
+
+    It is the one that gives the same answer on the command line.
+    """
+    source = Path(order.source)
+    again = command(order.source, order.settings)
+    return page("bar.html", name=source.name, stem=source.stem, reading=reading, command=again)
 
 
 def command(source: str, said: Settings) -> str:

@@ -58,7 +58,7 @@ def _diagnose(order: Order) -> Report:
     stage("Writing the answer")
     out, findings = Path(order.out), answer.findings
     (out / PAGE).write_text(diagnosis_page(findings), encoding="utf-8")
-    (out / SHOWN).write_text(diagnosis_page(findings, answer_bar(order)), encoding="utf-8")
+    (out / SHOWN).write_text(diagnosis_page(findings, answer_bar(order, str(reading))), encoding="utf-8")
     (out / TEXT).write_text(f"{answer}\n", encoding="utf-8")
     text = json.dumps(answer.to_json(), indent=1, allow_nan=False, ensure_ascii=False)
     (out / ANSWER).write_text(text + "\n", encoding="utf-8")

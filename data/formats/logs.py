@@ -39,6 +39,14 @@ def logs_of(folder: Path) -> list[Path]:
     )
 
 
+def not_read(folder: Path) -> tuple[str, ...]:
+    """Say which files of a folder are left out although their ending is that of a log."""
+    read = logs_of(folder)
+    left = [file for file in folder.iterdir() if file.is_file() and file.suffix.lower() in ENDINGS and file not in read]
+    names = sorted((file.name for file in left if not file.name.startswith(".")), key=natural_order)
+    return (f"without {', '.join(names[:3])}{', ..' if names[3:] else ''}",) if names else ()
+
+
 def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:
     """Read the chosen columns of several logs as the pieces of one record, each under the name of its log.
 

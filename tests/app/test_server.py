@@ -15,6 +15,9 @@ import pytest
 from app.cart_record import write_cart
 from app.commands import Served, end, simgap, start
 
+from simgap.app.orders import Order, Settings
+from simgap.app.pages import answer_bar
+
 
 def ask(served: Served, path: str, method: str = "GET", body: bytes = b"", **headers: str) -> tuple[int, str]:
     """Send one request below the address of the server, or to `path` as it stands where it begins with a slash."""
@@ -113,6 +116,14 @@ def test_a_clock_that_gives_no_sampling_time_leaves_a_place_for_one(served):
     for stamps, asked in (("01234567", False), ("00001111", True)):
         text = "t,u,y\n" + "".join(f"{t},{k % 2},{k}\n" for k, t in enumerate(stamps))
         assert ('name="dt"' in ask(served, upload(served, {"a.csv": text.encode()}))[1]) == asked
+
+
+def test_above_an_answer_stands_how_the_record_was_read():
+    order = Order("diagnose", "log.csv", Settings(["u"], ["y"], []))
+    assert "<p>Read: sampling time 0.1 s from column &lt;t&gt;.</p>" in answer_bar(
+        order, "read: sampling time 0.1 s from column <t>"
+    )
+    assert "Read:" not in answer_bar(order, "")
 
 
 def test_settings_that_are_none_are_refused_in_a_sentence(served):

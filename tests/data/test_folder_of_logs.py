@@ -38,6 +38,14 @@ def test_what_was_inferred_says_how_many_logs_there_are(logs):
     assert "10 logs, split 60/20/20 in this order: log1, log2, log3, .." in read(logs, **COLUMNS).said
 
 
+def test_what_else_of_a_folder_might_be_a_log_is_said_to_be_left_out(logs):
+    assert not any(text.startswith("without") for text in read(logs, **COLUMNS).said)
+    (logs / "notes.txt").write_text("new bearing")
+    (logs / "picture.png").touch()
+    shutil.copy(logs / "log1.csv", logs / "log11.tsv")
+    assert "without log11.tsv, notes.txt" in read(logs, **COLUMNS).said
+
+
 def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsys):
     files = [str(logs / f"log{k}.csv") for k in (5, 2, 7, 1, 9)]
     data = load(files, **COLUMNS)
