@@ -1,8 +1,8 @@
 """README.md and the pages of docs/ do what they say: their blocks are run in a folder with the files that they name.
 
 A comment above a block says what the block is: `<!-- file NAME -->` is the content of a file, `<!-- not run -->` is for
-make, which would run these tests again. Other blocks of sh and python are run as they stand, those under
-`<!-- slow -->` by make test-slow, those under `<!-- measured -->` where measured data are at hand.
+make, which would run these tests again. Other blocks of sh and python are run as they stand, those of docs/ by
+make test-slow; those under `<!-- measured -->` need measured data.
 """
 
 import os
@@ -25,18 +25,20 @@ BLOCK = re.compile(
 
 
 class Block(NamedTuple):
+    page: Path
     mark: str | None
     language: str
     text: str
 
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-BLOCKS = [Block(*match.groups()) for page in PAGES for match in BLOCK.finditer(page.read_text(encoding="utf-8"))]
-FILES = {mark.removeprefix("file "): text for mark, _, text in BLOCKS if mark and mark.startswith("file ")}
+README, *DOCS = PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCKS = [Block(page, *match.groups()) for page in PAGES for match in BLOCK.finditer(page.read_text(encoding="utf-8"))]
+FILES = {mark.removeprefix("file "): text for _, mark, _, text in BLOCKS if mark and mark.startswith("file ")}
 
 
-def to_run(language: str, mark: str | None = None) -> list[str]:
-    return list(dict.fromkeys(block.text for block in BLOCKS if (block.language, block.mark) == (language, mark)))
+def to_run(language: str, pages: list[Path], mark: str | None = None) -> list[str]:
+    found = (x.text for x in BLOCKS if (x.language, x.mark) == (language, mark) and x.page in pages)
+    return list(dict.fromkeys(found))
 
 
 def write_record(path: Path, output: str, seed: int, samples: int = 300) -> None:
@@ -87,18 +89,19 @@ def run(folder: Path, *command: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("script", [text for text in to_run("sh") if "--save arm.simgap" not in text])  # below
+@pytest.mark.parametrize("script", to_run("sh", [README]))
 def test_the_commands_run(script, folder):
     assert run(folder, "bash", "-euo", "pipefail", "-c", script)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", to_run("sh", "slow"))
-def test_the_long_commands_run(script, folder):
+@pytest.mark.parametrize("script", [text for text in to_run("sh", DOCS) if "--save arm.simgap" not in text])  # below
+def test_the_commands_of_the_other_pages_run(script, folder):
     assert run(folder, "bash", "-euo", "pipefail", "-c", script)
 
 
-@pytest.mark.parametrize("script", to_run("python"))
+@pytest.mark.slow
+@pytest.mark.parametrize("script", to_run("python", PAGES))
 def test_the_python_runs(script, folder):
     assert "# Leaderboard" in run(folder, sys.executable, "-W", "error", "-c", script)
 
@@ -106,7 +109,7 @@ def test_the_python_runs(script, folder):
 @pytest.mark.slow
 def test_the_way_from_a_log_to_a_better_simulator_ends_with_the_numbers_that_it_shows(folder):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-    (script,) = (text for text in to_run("sh") if "--save arm.simgap" in text)
+    (script,) = (text for text in to_run("sh", DOCS) if "--save arm.simgap" in text)
     said = run(folder, "bash", "-euo", "pipefail", "-c", script)
     assert "The simulation errs because of Coulomb friction and gravity" in said
     assert said.count("the same free run") == 2
@@ -115,8 +118,9 @@ def test_the_way_from_a_log_to_a_better_simulator_ends_with_the_numbers_that_it_
     assert float(joint.get("damping")) == pytest.approx(0.05 * 3.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_way_from_measured_records_ends_with_the_numbers_that_it_shows(folder, measured):
-    said = "".join(run(folder, "bash", "-euo", "pipefail", "-c", script) for script in to_run("sh", "measured"))
+    said = "".join(run(folder, "bash", "-euo", "pipefail", "-c", script) for script in to_run("sh", DOCS, "measured"))
     (shown,) = (block.text for block in BLOCKS if block.language == "text" and "square-root share" in block.text)
     assert not [line for line in shown.splitlines() if line != "..." and line not in said]
     assert "0.605 V" in said
@@ -133,7 +137,7 @@ def test_its_model_in_baselines_is_registered_by_that_one_file(folder):
 
 
 def test_what_is_not_run_is_make():
-    lines = [line for mark, _, text in BLOCKS if mark == "not run" for line in text.splitlines()]
+    lines = [line for _, mark, _, text in BLOCKS if mark == "not run" for line in text.splitlines()]
     assert lines
     assert all(line.startswith("make ") or line == "source .venv/bin/activate" for line in lines)
 
@@ -157,7 +161,7 @@ def test_every_model_stands_in_the_table_that_says_when_to_use_it():
 
 
 @pytest.mark.parametrize(
-    "page", [*PAGES, *sorted(ROOT.glob("*/**/README.md"))], ids=lambda page: str(page.relative_to(ROOT))
+    "page", [*PAGES, *sorted(ROOT.glob("[a-z]*/**/README.md"))], ids=lambda page: str(page.relative_to(ROOT))
 )
 def test_every_make_target_it_names_exists(page):
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
