@@ -61,7 +61,7 @@ class Baseline:
 
     @property
     def resolution(self) -> Float[np.ndarray, " ny"]:
-        """The smallest error of each output that means anything, in training and in held-out data."""
+        """The smallest spread of each output that may count as likely, in training and in held-out data."""
         return self.train.resolution
 
     @cached_property

@@ -116,7 +116,7 @@ def _predicted(estimate: Estimate, records: Records, responses: np.ndarray, jaco
         return 0.0  # too few samples to hold any out
     features = normalised(np.concatenate((model, responses[mask]), axis=1))
     own = model.shape[1]
-    rounding = len(e) * float(records.resolution[0]) ** 2
+    rounding = len(e) * float(records.rounding[0]) ** 2
     shares = []
     best = 0.0
     for ridge in RIDGES:

@@ -20,9 +20,9 @@ from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_from, fit_plain
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts, is_cut
+from simgap.greybox.samples import Records, excerpts, is_cut, quantisation_step
 from simgap.greybox.score_test import candidates
-from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.signal_scales import scales_of
 from simgap.greybox.subspace_start import linear_models, starts
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import score_gain

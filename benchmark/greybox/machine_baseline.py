@@ -17,8 +17,8 @@ from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.outliers import find_glitches, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts, is_cut
-from simgap.greybox.signal_scales import quantisation_step, scales_of
+from simgap.greybox.samples import Records, excerpts, is_cut, quantisation_step
+from simgap.greybox.signal_scales import scales_of
 from simgap.greybox.terms import PlantScales
 from simgap.records import Channels, Experiment
 
@@ -86,7 +86,7 @@ def fit_machine(plant: Plant, records: Records, start: Estimate | None = None) -
     """Fit a machine without effects from `start`, or the best of a grid of its frequency, damping and inertia."""
     machine = plant.machine
     assert machine is not None
-    problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)))
+    problem = Problem(plant, records, white(np.maximum(np.std(records.y[records.mask], axis=0), records.rounding)))
     if start is not None:
         return _weighed(descend(problem, start.theta, start.local), records)
     gain = np.arange(plant.size) == plant.layout.gains.start

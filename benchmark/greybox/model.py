@@ -196,7 +196,7 @@ class FittedPlant:
     def log_likelihood(self) -> float:
         """Compute the log-likelihood of the errors as white noise, up to a constant."""
         e = self.estimate.errors[self.records.mask]
-        return float(-0.5 * len(e) * np.sum(np.log(np.mean(e * e, axis=0) + self.records.resolution**2)))
+        return float(-0.5 * len(e) * np.sum(np.log(np.maximum(np.mean(e * e, axis=0), self.records.resolution**2))))
 
 
 @dataclass(eq=False)

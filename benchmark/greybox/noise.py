@@ -100,7 +100,7 @@ def log_likelihood(
 
     The first samples of each record are not counted: `skipped` of them, else as many as the noise remembers. Orders
     are compared on the same samples only, because the unit of e enters once for every sample. `resolution` is the
-    smallest error of each output that means anything, so that of two perfect fits none is the better one.
+    smallest spread of each output that may count as likely, so that of two perfect fits none is the better one.
     """
     noise = estimate(e, mask, order)
     if not np.isfinite(noise.deviations).all():
@@ -110,5 +110,5 @@ def log_likelihood(
     if not counted.any():
         return 0.0
     w = noise.whiten(e)[counted] * noise.deviations  # [N, ny]
-    variance = np.mean(w * w, axis=0) + np.square(resolution)
+    variance = np.maximum(np.mean(w * w, axis=0), np.square(resolution))
     return float(-0.5 * counted.sum() * np.sum(np.log(np.maximum(variance, np.finfo(float).tiny))))

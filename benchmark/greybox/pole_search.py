@@ -68,7 +68,7 @@ def fit_from(plant: Plant, records: Records, starts: Sequence[np.ndarray]) -> Es
 
 
 def _plain_problem(plant: Plant, records: Records) -> Problem:
-    spread = np.maximum(np.std(records.y[records.mask], axis=0), records.resolution)
+    spread = np.maximum(np.std(records.y[records.mask], axis=0), records.rounding)
     return Problem(plant, records, white(spread))
 
 

@@ -147,7 +147,7 @@ def _learn_plant(plant: FittedPlant, y_hat: np.ndarray, seed: int) -> list[RestO
     for j in range(e.shape[2]):
         features, best = min(tried, key=lambda pair: float(pair[1].after[:, j].sum()))
         before, after = best.before[:, j], best.after[:, j]
-        rounding = float(records.resolution[j]) ** 2 * len(e[rows])
+        rounding = float(records.rounding[j]) ** 2 * len(e[rows])
         largest = float(np.abs(e[..., j][mask]).max())
         share = float(1 - (after.sum() + rounding) / (before.sum() + rounding))
         rest = RestOfOutput(features, best.means, best.coefficients[:, j].copy(), largest, share)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,10 @@ SEARCH_SAMPLES = 5000
 PIECE = 500
 # Of the size of a signal: an error that is smaller is rounding, of a file or of a simulation, and means nothing.
 RESOLUTION = 1e-9
+# Of the step of a coarse reading: a normal density of less spread would give a reading a chance above one.
+CELL = 1 / math.sqrt(2 * math.pi * math.e)
+# Readings are taken to lie on a grid when this share of them are whole multiples of its step.
+ON_GRID = 0.999
 OFFSET = 1e-6  # the share of its largest value that a reading must move by to be no constant; more than rounding
 
 
@@ -66,9 +71,15 @@ class Records:
         return sizes_of(self.u[self.mask])
 
     @property
-    def resolution(self) -> Float[np.ndarray, " ny"]:
-        """The smallest error of each output that means anything."""
+    def rounding(self) -> Float[np.ndarray, " ny"]:
+        """The largest error of each output that is rounding, of a file or of a simulation."""
         return RESOLUTION * self.sizes
+
+    @cached_property
+    def resolution(self) -> Float[np.ndarray, " ny"]:
+        """The smallest spread of a reading about what was expected of it that may count as likely, for each output."""
+        steps = [quantisation_step(self.y[:, :, j]) for j in range(self.y.shape[2])]
+        return np.maximum(self.rounding, CELL * np.array(steps))
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
@@ -147,3 +158,17 @@ def pieces_of(experiments: Sequence[Experiment]) -> list[Experiment]:
 def is_cut(chosen: Sequence[Experiment], experiments: Sequence[Experiment]) -> bool:
     """Tell whether what was chosen of these experiments are pieces of them."""
     return len(chosen) > len(experiments) or max(map(len, chosen)) < max(map(len, experiments))
+
+
+def quantisation_step(y: Float[np.ndarray, "E T"]) -> float:
+    """Find the step of the grid that all readings lie on; 0 when they do not, or when it is too fine to matter."""
+    values = np.unique(y)
+    if len(values) < 3:
+        return 0.0
+    steps = np.diff(values)
+    step = float(np.min(steps[steps > 1e-9 * np.ptp(values)], initial=np.inf))
+    if not np.isfinite(step) or step < 1e-3 * np.std(y):
+        return 0.0
+    whole = values / step
+    # A digital reading is a multiple of its step; rounding in a file leaves a little.
+    return step if np.mean(np.abs(whole - np.round(whole)) < 0.02) > ON_GRID else 0.0

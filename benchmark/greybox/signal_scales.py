@@ -12,14 +12,12 @@ from simgap.greybox import dynamics
 from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records
+from simgap.greybox.samples import Records, quantisation_step
 from simgap.greybox.terms import PlantScales
 from simgap.records import Channels
 
 MAX_LINES = 3
 AROUND = 20  # lines on each side that one is compared with
-# Two neighbouring readings are taken to lie on one grid when this share of all steps are whole multiples of it.
-ON_GRID = 0.999
 
 
 def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs: Sequence[int]) -> PlantScales:
@@ -95,17 +93,3 @@ def _peaks(power: np.ndarray, frequencies: np.ndarray, duration: float) -> tuple
         found.append(float(frequencies[peak]))
         power[np.abs(frequencies - frequencies[peak]) < 1.0 / duration] = 0.0
     return tuple(found)
-
-
-def quantisation_step(y: Float[np.ndarray, "E T"]) -> float:
-    """Find the step of the grid that all readings lie on; 0 when they do not, or when it is too fine to matter."""
-    values = np.unique(y)
-    if len(values) < 3:
-        return 0.0
-    steps = np.diff(values)
-    step = float(np.min(steps[steps > 1e-9 * np.ptp(values)], initial=np.inf))
-    if not np.isfinite(step) or step < 1e-3 * np.std(y):
-        return 0.0
-    whole = values / step
-    # A digital reading is a multiple of its step; rounding in a file leaves a little.
-    return step if np.mean(np.abs(whole - np.round(whole)) < 0.02) > ON_GRID else 0.0

@@ -168,7 +168,7 @@ def free_run_ratio(baseline: Baseline, smaller: Trial, larger: Trial) -> float:
         before, after = (trial.estimate.errors[..., j][mask] for trial in (smaller, larger))
         tau, _ = correlation_time(after, mask.sum(axis=1), 0)
         least = len(after) * baseline.resolution[j] ** 2
-        ratio += 0.5 * len(after) / tau * math.log((before @ before + least) / (after @ after + least))
+        ratio += 0.5 * len(after) / tau * math.log(max(before @ before, least) / max(after @ after, least))
     return ratio
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from simgap.reports.rendering import printable
+from simgap.reports.tables import with_unit
 
 
 def file_names(labels: Iterable[str]) -> dict[str, str]:
@@ -30,7 +31,7 @@ def file_names(labels: Iterable[str]) -> dict[str, str]:
 
 def plot_text(text: str, unit: str = "") -> str:
     """Write a name with its unit for plotly, which obeys some HTML in texts, so that none may be left."""
-    whole = printable(f"{text} [{unit}]" if unit else text)
+    whole = printable(with_unit(text, unit))
     return whole.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
