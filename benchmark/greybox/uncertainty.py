@@ -70,11 +70,13 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     moved = np.concatenate(g) @ root / scale  # [blocks, p]
     share = np.concatenate(samples) / measured.sum()
     freedom = max(1, records.samples * plant.ny - int(inside.sum()) - estimate.local.size)
-    of_white = float(np.vdot(white, white)) / freedom * np.sum((root / scale) ** 2, axis=0)
+    least = records.samples * float(np.sum((records.resolution / noise.deviations) ** 2))  # of readings in steps
+    of_white = max(float(np.vdot(white, white)), least) / freedom * np.sum((root / scale) ** 2, axis=0)
     of_blocks = np.sum(moved**2, axis=0)
     wider = np.sqrt(np.maximum(1.0, of_white / np.where(of_blocks > 0, of_blocks, np.inf)))
     covariance = np.zeros((len(theta), len(theta)))
-    covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider)
+    unmoved = np.diag(np.where(of_blocks > 0, 0.0, of_white))  # no error at all
+    covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider) + unmoved
     return Uncertainty(covariance, max(2.0, 1 / np.sum(share**2) - 1))
 
 
