@@ -16,6 +16,7 @@ from simgap.cli.options import (
     Resample,
     SamplingTime,
     SplitGaps,
+    check_writable,
     read_data,
     write_json,
 )
@@ -60,6 +61,7 @@ def check(
     """Read a data set as `run` would, refuse it with a reason, or say what it holds."""
     from simgap.data import describe
 
+    check_writable(json, read=[name])
     described = describe(read_data(name, inputs, outputs, dt, kind, resample, split_gaps).dataset)
     if json is not None:
         write_json(json, described)

@@ -42,7 +42,7 @@ def diagnose(
     save: Annotated[Path | None, typer.Option(help="Write the model that the answer ends with into this file.")] = None,
 ) -> None:
     """Show what a linear model of the data, or your own simulation, gets wrong, why, and what correcting it gains."""
-    check_writable(json, html, save)
+    check_writable(json, html, save, read=data)
     reading = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known, simulated)
 
     # Here, so that a file that cannot be used is refused before loops are compiled.

@@ -60,7 +60,7 @@ def fit(
     from simgap.saved.codec import name_of
 
     params = parse_params(param or ())
-    check_writable(json, save)
+    check_writable(json, save, read=[*data, model])
     if save is not None:
         name_of(fitting.model_class(model))  # refuses what no file could name
     console = Console()

@@ -60,7 +60,7 @@ def next_record(
     """
     from simgap.records import UnusableInput
 
-    check_writable(out, json)
+    check_writable(out, json, read=data)
     if among is not None and any((input_range, rate, seconds, travel, out)):
         raise UnusableInput("--among takes the records as they are; leave out limits and --out")
     spans = [parse_limits(name, given or (), 2) for name, given in (("input-range", input_range), ("travel", travel))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -61,6 +62,8 @@ def parse_params(pairs: Sequence[str]) -> dict[str, Any]:
         name, equals, text = pair.partition("=")
         if not (name.isidentifier() and equals):
             raise UnusableInput(f"--param {pair}: write it as name=value")
+        if name in params:
+            raise UnusableInput(f"--param {pair}: {name} is given twice; leave one out")
         try:
             params[name] = tomllib.loads(f"value = {text}")["value"]
         except (ValueError, RecursionError):  # TOMLDecodeError, a date in month 13, lists in lists without end
@@ -77,6 +80,8 @@ def parse_kinds(pairs: Sequence[str]) -> str | dict[str, str] | None:
         name, equals, kind = pair.rpartition("=")
         if not (equals and name.strip()):
             raise UnusableInput(f"--kind {pair}: write it as NAME=KIND where there are several outputs")
+        if name.strip() in kinds:
+            raise UnusableInput(f"--kind {pair}: the kind of {name.strip()} is given twice; leave one out")
         kinds[name.strip()] = kind.strip()
     return kinds or None
 
@@ -137,11 +142,31 @@ def model_faults(step: str) -> Iterator[None]:
         raise typer.Exit(1) from None
 
 
-def check_writable(*files: Path | None) -> None:
-    """Raises UnusableInput, before any work is done, for a file whose folder does not exist or that is a folder."""
-    for file in files:
-        if file is not None and (file.is_dir() or not file.parent.is_dir()):
-            raise UnusableInput(f"{file} cannot be written: give a file in a folder that exists")
+def check_writable(*files: Path | None, read: Sequence[str] = ()) -> None:
+    """Raises UnusableInput, before any work is done, for a file that cannot be written or that would be lost.
+
+    It would where two outputs go into one file, or where it is one of what is `read`: data, models, suites.
+    """
+    from simgap.registry import file_of
+
+    sources = [Path(file_of(source) or source) for source in read]
+    wanted = [file for file in files if file is not None]
+    for i, file in enumerate(wanted):
+        if file.is_dir() or not file.parent.is_dir() or not os.access(file if file.exists() else file.parent, os.W_OK):
+            raise UnusableInput(f"{file} cannot be written: give a file in a folder that exists and is yours to write")
+        if any(file.resolve() == other.resolve() for other in wanted[:i]):
+            raise UnusableInput(f"{file} is named twice; give each output a file of its own")
+        if file.exists() and any(_is_of(file, source) for source in sources):
+            raise UnusableInput(f"{file} is read, and would be overwritten; give another file")
+
+
+def _is_of(file: Path, source: Path) -> bool:
+    """Tell whether a file is this source, or one of the data in this folder."""
+    from simgap.data.formats.logs import ENDINGS
+
+    if source.is_dir():
+        return file.suffix.lower() in (*ENDINGS, ".toml") and source.resolve() in file.resolve().parents
+    return source.exists() and file.samefile(source)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -44,7 +44,7 @@ def range_test(
     from simgap.reports.curves import LearningRates
     from simgap.running import fitting
 
-    check_writable(json, html)
+    check_writable(json, html, read=[data, model])
     built: Any = fitting.build(model, parse_params(param or ()))
     if not hasattr(built, "range_test"):
         raise UnusableInput(f"{model} has no learning rate; networks have: see `simgap list models`")

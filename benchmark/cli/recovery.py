@@ -107,7 +107,7 @@ def score(
     from simgap.reports.recovery_rates import rate_tables
     from simgap.reports.rendering import to_rich
 
-    check_writable(json)
+    check_writable(json, read=[str(file) for file in files])
     counted = recovery.score(files, seed)
     if json is not None:
         write_json(json, counted)

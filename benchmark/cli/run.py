@@ -51,7 +51,7 @@ def run(
     """
     from simgap.running.suites import STUDY
 
-    check_writable(json)
+    check_writable(json, read=[suite, *(names(datasets) or ()), *(model or ())])
     if suite == STUDY:
         from simgap.cli import recovery
 

@@ -31,7 +31,7 @@ def simulate(
     from simgap.saved import simulate as on_records
     from simgap.saved.archive import read_saved
 
-    check_writable(out, json)
+    check_writable(out, json, read=[str(saved), data])
     model = read_saved(saved)
     about = model.fitted_on
     try:

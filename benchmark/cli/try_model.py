@@ -18,7 +18,7 @@ def try_model(
     """Say in seconds whether a model keeps its contract, and in words what is wrong."""
     from simgap import contract
 
-    check_writable(json)
+    check_writable(json, read=[model])
     candidate = contract.candidate(model, parse_params(param or ()))
     start = time.perf_counter()
     results = []

@@ -54,7 +54,7 @@ def tune(
     from simgap.running import fitting
     from simgap.running.tuning import tune as search
 
-    check_writable(json, out)
+    check_writable(json, out, read=[data, model])
     params = parse_params(param or ())
     fitting.check_params(model, params)  # first, because data may take seconds to load
     asked = [_range(text) for text in ranges or ()]

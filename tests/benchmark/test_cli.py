@@ -34,6 +34,7 @@ def test_the_version_is_printed(capsys):
         "run --datasets nosuch", "run --json nosuch/rows.json", "list", "list nosuch", "fit",
         "fit nosuch gimbal", "fit mean",
         "fit mean nosuch", "fit mean gimbal --param na", "fit mean gimbal --param =3", "report nosuch",
+        "fit arx gimbal --param na=2 --param na=3", "fit arx gimbal --kind phi=position --kind phi=velocity",
         "data", "data nosuch", "data make", "data make nosuch", "data fetch nosuch", "data check nosuch",
     ],
 )  # fmt: skip

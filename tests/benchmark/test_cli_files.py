@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from simgap.cli import main
+from simgap.cli.options import check_writable
 
 
 def run(capsys, *arguments):
@@ -92,3 +93,30 @@ def test_uneven_time_is_put_right_by_the_option_that_the_refusal_names(capsys, m
     code, out, _ = run(capsys, "data", "check", motor, *COLUMNS, "--split-gaps", "--resample", "0.02")
     assert code == 0
     assert "560 rows resampled to 280 samples every 0.02 s, each the mean over 0.02 s" in out
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "fit arx LOG --input u --output phi --save LOG", "fit arx LOG --input u --output phi --json LOG",
+        "fit my_model.py:Mine LOG --input u --output phi --json my_model.py", "simulate a.simgap LOG --out LOG",
+        "diagnose LOG --input u --output phi --html LOG", "next LOG --input u --output phi --out LOG",
+        "diagnose logs --input u --output phi --json LOG", "run smoke --datasets LOG --json LOG",
+        "tune arx LOG --range na=1..3 --json LOG", "diagnose LOG --html a.html --json ./a.html",
+    ],
+)  # fmt: skip
+def test_what_is_read_is_never_written_over_and_no_output_over_another(capsys, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "logs").mkdir()
+    for name in ("logs/my.csv", "a.simgap", "my_model.py"):
+        (tmp_path / name).write_text("kept")
+    code, out, err = run(capsys, *command.replace("LOG", "logs/my.csv").split())
+    assert (code, out) == (2, "")
+    assert "would be overwritten; give another file" in err or "give each output a file of its own" in err
+    assert all((tmp_path / name).read_text() == "kept" for name in ("logs/my.csv", "a.simgap", "my_model.py"))
+
+
+def test_an_answer_is_written_anew_into_the_folder_of_the_logs(tmp_path):
+    (tmp_path / "my.csv").touch()
+    (tmp_path / "answer.json").touch()
+    check_writable(tmp_path / "answer.json", read=[str(tmp_path)])
