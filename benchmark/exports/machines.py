@@ -100,13 +100,15 @@ class MachineWriter(PlantWriter):
         lines += [f"    other += {call}" for _, call in self.forces("force", x, "v", h)]
         lines.append("    hold = 0.0")
         lines += self.frictions(x, "v", h, f"drive - {p}[{BACK_EMF}] * on * v - other")
-        lines += [f"    other -= {call}" for _, call in self.forces("outflow", x, "0.0", h)]
+        lines.append(f"    d = {p}[{DAMPING}] + {p}[{BACK_EMF}] * on")
+        lines += [f"    other -= d * {call}" for _, call in self.forces("outflow", x, "0.0", h)]
         lines += [
-            f"    d = {p}[{DAMPING}] + {p}[{BACK_EMF}] * on", 
             f"    scale = -math.expm1(-{h} * d / (inertia + 1e-300)) / d if d > 0.0 else {h} / (inertia + 1e-300)",
             "    new = v + scale * (drive + other - d * v)", "    if hold > 0.0:",
             "        new += scale * dry_friction(v, new, scale, hold)",
         ]  # fmt: skip
+        rims = [plant.part_of(term).start for term, _ in self.forces("rim", x, "v", h)]
+        lines += [f"    new = min(new, {p}[{at}])" for at in rims]
         if moves:
             lines.append(f"    q += 0.5 * {h} * (v + new)")
             for term, _ in self.forces("stop", x, "v", h):

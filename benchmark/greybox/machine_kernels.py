@@ -71,10 +71,12 @@ def run_machine(  # noqa: PLR0912 - one loop, so that it stays in registers
                         memory[m_at[j]] = drive - back_emf * on * v - other
                     hold += terms[j](x, v, t, h, p, p_at[j], held, m_at[j])
                 for j in range(until[FRICTION], until[OUTFLOW]):
-                    other -= terms[j](x, 0.0, t, h, p, p_at[j], held, m_at[j])
+                    other -= d * terms[j](x, 0.0, t, h, p, p_at[j], held, m_at[j])
                 new = v + scale * (drive + other - d * v)
                 if hold > 0.0:
                     new += scale * dry_friction(v, new, scale, hold)
+                for j in range(until[OUTFLOW], until[RIM]):
+                    new = min(new, p[p_at[j]])
                 if n > 1:
                     q += 0.5 * h * (v + new)
                     for j in range(until[RIM], until[STOP]):

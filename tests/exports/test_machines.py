@@ -114,6 +114,17 @@ def test_a_servo_in_degrees_a_cart_and_a_tank_run_as_ours(inputs, table, kind, u
     assert differs(*machine(inputs, table, kind, unit, **numbers)) < 1e-9
 
 
+def test_a_tank_that_empties_through_a_hole_and_overflows_runs_as_ours():
+    holes = effect("sqrt_outflow", 0, [0.8, 0.05])
+    saved, x = machine(*TANK, "level", "m", terms=(holes,), damping=0.02, gain=1.0)
+    rim = float(np.percentile(saved.model.simulate(x.u[None], x.y[None, :6])[0], 60))
+    terms = holes, effect("overflow", 0, [rim])
+    full, x = machine(*TANK, "level", "m", terms=terms, damping=0.02, gain=1.0)
+    assert np.max(full.model.simulate(x.u[None], x.y[None, :6])[0]) == rim
+    assert differs(saved, x) < 1e-9
+    assert differs(full, x) < 1e-9
+
+
 @pytest.fixture(scope="module")
 def rubbing():
     """A servo that MuJoCo can hold, and its record."""

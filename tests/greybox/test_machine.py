@@ -1,6 +1,7 @@
 """A machine of which something is known: a servo with its controller inside, a cart, a wheel and a tank."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,18 @@ def test_a_cart_a_wheel_and_a_tank_have_the_mass_inertia_or_area_of_each_run(kin
     assert found["inertia"] == pytest.approx(0.0, abs=0.03)
     assert found["damping"] == pytest.approx(0.7, rel=0.05)
     assert found["gain"] == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("effect", ["sqrt_outflow", "overflow"])
+def test_what_leaves_a_tank_is_found_whatever_its_known_area(effect):
+    data = hide("tank", {effect: 1.0}, noise=0.0, seed=7).training
+    squares = []
+    for area in ("1 cm^2", "0.2 m^2", "30 m^2"):
+        model = MODELS["greybox"](effects=("sqrt_outflow", "overflow") if effect == "overflow" else (effect,))
+        model.fit(replace(data, channels=known(data.channels, {"area": area})), 0)
+        squares.append(np.mean(model.plants[0].estimate.errors ** 2))
+    assert max(squares) < 1e-4 * np.var(np.concatenate([x.y for x in data.train]))
+    assert max(squares) == pytest.approx(min(squares), rel=1e-3)
 
 
 def test_of_a_machine_without_a_known_mass_the_inertia_is_one():
