@@ -36,7 +36,10 @@ Resample = Annotated[
 ]
 KnownOf = Annotated[
     list[str] | None,
-    typer.Option("--known", help="What is known of the machine: mass=0.5kg, arm=0.1m, controller.goal=r; repeatable."),
+    typer.Option(
+        "--known",
+        help="What grey boxes are told of the machine: mass=0.5kg, arm=0.1m, controller.goal=r; repeatable.",
+    ),
 ]
 SplitGaps = Annotated[
     bool, typer.Option("--split-gaps", help="Start a new experiment at each gap in time and after missing cells.")

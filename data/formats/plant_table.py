@@ -22,6 +22,7 @@ INTERVAL_KEYS = ("value", "low", "high")
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*")
 IN_FILE, AS_OPTION = "[plant]", "--known"  # where a person wrote the table
 MOVING = ("position", "velocity", "level")  # kinds of outputs that a machine moves
+OF_A_BODY, OF_A_TANK = ("mass", "arm", "inertia", "gravity", "hangs_at", "ticks_per_turn"), ("area",)
 STANDARD_GRAVITY = 9.80665
 TICKS = ("tick", "ticks", "count", "counts")
 FORCES = {"Nm": 1.0, "mNm": 1e-3, "N": 1.0, "mN": 1e-3}
@@ -63,8 +64,10 @@ def read_plant(table: Any, channels: Channels, where: str, called: str = IN_FILE
         _check_table(controller, CONTROLLER_KEYS, f"{where}: controller", required=("goal",))
         if output.kind != "position":
             raise UnusableInput(f"{where}: a controller of a {output.kind} is not known here; leave it out")
-    if "inertia" in table and "area" in table:
-        raise UnusableInput(f"{where}: inertia and area are the same number of two machines; leave one out")
+    others = OF_A_BODY if output.kind == "level" else OF_A_TANK
+    if foreign := [key for key in others if key in table]:
+        own = "a tank has an area" if output.kind == "level" else "a body has a mass or an inertia"
+        raise UnusableInput(f"{where}: {foreign[0]} is nothing of a {output.kind}; {own}, so leave it out")
     known = {key: constant(table, key) for key in ("mass", "arm", "damping", "supply")}
     inertia = constant(table, "inertia") or constant(table, "area")
     of_controller = {key: constant(controller or {}, key) for key in ("gain", "derivative")}

@@ -17,7 +17,8 @@ def plant_lines(plant: KnownPlant, channels: Channels) -> list[str]:
     for key in ("mass", "arm", "inertia", "damping", "supply"):
         known: Known | None = getattr(plant, key)
         if known is not None:
-            lines.append(f"{key} = {_constant(known)}")
+            of_tank = key == "inertia" and channels.outputs[0].kind == "level"
+            lines.append(f"{'area' if of_tank else key} = {_constant(known)}")
     if plant.enabled:
         lines.append(f"enabled = {_quoted(plant.enabled)}")
     if plant.gravity:

@@ -23,6 +23,7 @@ TABLE = {
     "controller": {"goal": "goal", "gain": "kp"},
 }  # fmt: skip
 TWO = Channels((Channel("a"), Channel("b")), (Channel("x", "m", "position"),))
+TANK = Channels((Channel("pump", "V"),), (Channel("h", "cm", "level"),))
 CART = Channels((Channel("force", "N"),), (Channel("x", "m", "position"),))
 
 
@@ -53,6 +54,7 @@ MIXED = Channels((Channel("goal", "ticks"), Channel("m", "kg")), (Channel("q", "
         (SERVO, {**TABLE, "hangs_at": 0.3, "gravity": 1.62}),
         (CART, {"mass": "500 g", "damping": {"low": 0.1, "high": 0.3}}),
         (CART, {"inertia": {"low": 1.0, "value": 1.2, "high": 2.0}}),
+        (TANK, {"area": "20 cm^2"}),
         (TICKS, {"mass": "m", "ticks_per_turn": 4096, "controller": {"goal": "goal", "gain": 3, "derivative": 0.1}}),
         (MIXED, {"mass": "m", "ticks_per_turn": 4096, "controller": {"goal": "goal", "gain": {"low": 1, "high": 2}}}),
     ],
@@ -89,6 +91,8 @@ def test_a_saved_data_set_keeps_what_is_known_of_its_machine(tmp_path):
         (CART, {"controller": {"gain": 1.0}}, "goal is missing"),
         (CART, {"controller": 3}, "controller must be a table"),
         (TWO, {}, "which input drives it? Write input = one of a, b"),
+        (TANK, {"mass": "1 kg"}, "mass is nothing of a level; a tank has an area, so leave it out"),
+        (CART, {"area": "1 m^2"}, "area is nothing of a position; a body has a mass or an inertia, so leave it out"),
         (SERVO, {**TABLE, "supply": 12.0}, "does not say what 'volts' is"),
         (SERVO, {**TABLE, "supply": "load"}, "named twice"),
         (Channels((Channel("u"),), (Channel("y"),)), {}, "whose kind is position, velocity or level"),
