@@ -143,11 +143,15 @@ def runner_up(findings: Findings) -> str:
     gain, margin = second.get("gain"), second.get("margin")
     told = f"{second.get('title') or second.get('effect')}"
     if gain is not None:
-        told += f"; by itself it would make the held-out squared error {percent(gain)} smaller"
+        change = "larger" if gain < 0 else "smaller"
+        told += f"; by itself it would make the held-out squared error {percent(abs(gain))} {change}"
     if margin is None:
         return f"{told}."
     place = "behind" if margin >= 0 else "ahead of"
-    return f"{told}. In log-likelihood it is {number(abs(margin))} {place} the best of the causes by itself."
+    return (
+        f"{told}. By the log-likelihood of training and held-out data, less what its parameters cost, it is "
+        f"{number(abs(margin))} {place} the best of the causes by itself."
+    )
 
 
 def titles_of(findings: Findings, output: str) -> dict[str, str]:

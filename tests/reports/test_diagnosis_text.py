@@ -35,8 +35,9 @@ Cause 1: Coulomb friction
     direction: play is already taken up.
 
 Runner-up
-  Viscous drag; by itself it would make the held-out squared error 21 % smaller. In log-likelihood
-    it is 35.2 behind the best of the causes by itself.
+  Viscous drag; by itself it would make the held-out squared error 21 % smaller. By the
+    log-likelihood of training and held-out data, less what its parameters cost, it is 35.2 behind
+    the best of the causes by itself.
 
 Free-run RMSE on the test experiments
   x: 1.24 -> 0.768 mm (-38 %)
