@@ -76,8 +76,8 @@ def limits_of(
     low, high, rates = u.min(axis=0), u.max(axis=0), fastest / dataset.training.dt
     if not moved:
         raise UnusableInput(f"{dataset.name}: no input moves within a record, so there is nothing to design")
-    for i, (first, last) in _by_channel("input_range", input_range, inputs, moved).items():
-        low[i], high[i] = _ordered("input_range", first, last)
+    for i, (first, last) in _by_channel("input range", input_range, inputs, moved).items():
+        low[i], high[i] = _ordered("input range", first, last)
     for i, value in _by_channel("rate", rate, inputs, moved).items():
         rates[i] = value
         if not 0 < value < np.inf:

@@ -94,6 +94,8 @@ def _counted(table: Table, column: str, t: Float[np.ndarray, " T"]) -> Clock:
         why = f"{t[0]:.9g} may count days, as Excel and MATLAB do, or seconds; write the unit into the heading"
         raise table.refuse(0, column, f"{why}, such as 'time [d]' or 'time [s]'")
     times, parts = seconds_in(unit or "s") or (1, 1)
+    if (times, parts) == (1, 1) and unit and t.size and abs(t[0]) > EPOCH[1]:
+        raise table.refuse(0, column, f"{t[0]:.6g} s is no time of a record; correct the unit in the heading")
     if (times, parts) == (1, 1):
         return Clock(table, column, t)
     return Clock(table, column, t * times / parts, unit or "")

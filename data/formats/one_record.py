@@ -137,6 +137,10 @@ def _channels(table: Table, inputs: Sequence[str], outputs: Sequence[str]) -> Ch
 
 
 def _sampling_time(table: Table, clock: Clock | None, choices: Choices) -> float:
+    taken = [name for name in (*choices.inputs, *choices.outputs) if clock is None and time_unit(name) is not None]
+    if taken and choices.dt is None:
+        raise UnusableInput(f"{table.source}: {taken[0]!r} is the time, and cannot be an input or output beside; "
+                            "leave it out of them, or give the sampling time (--dt)")  # fmt: skip
     if clock is None and (choices.resample is not None or choices.split_gaps):
         raise UnusableInput(f"{table.source}: without a time column there are no gaps and nothing to resample; "
                             f"call it 't' or 'time'")  # fmt: skip
@@ -167,7 +171,8 @@ def _told(
     about += [f"units from row {table.first_row - 1}"] if layout.units else []
     units = any(channel.unit for channel in (*channels.inputs, *channels.outputs))
     units |= any(channel.kind_from == "header" for channel in channels.outputs)
-    slow = clock is not None and dt >= 1 and not clock.counts and not table.heading(clock.column).unit
+    unsaid = clock is not None and not time_unit(clock.column, table.heading(clock.column).unit)
+    slow = clock is not None and unsaid and dt >= 1 and not clock.counts
     if clock is not None and (about or said or units or clock.counts or slow or clock.column not in ("t", "time")):
         counts = f", which {'holds' if clock.is_dated else 'counts'} {clock.counts}" if clock.counts else ""
         counts = (

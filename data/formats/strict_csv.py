@@ -153,5 +153,7 @@ def _uneven(path: Path, number: int, row: list[str], names: tuple[str, ...], hea
     if len(row) < len(names):
         why = f"ends before column {short(names[len(row)])}; complete or delete the row"
     else:
-        why = f"has {len(row) - len(names)} more cells after column {short(names[-1])}; remove them"
+        more = len(row) - len(names)
+        cells = "one more cell" if more == 1 else f"{more} more cells"
+        why = f"has {cells} after column {short(names[-1])}, which has no name; name it, or remove it"
     return UnusableInput(f"{path}: row {number} {why}")

@@ -7,6 +7,7 @@ import pytest
 from simgap.data import load
 from simgap.data.formats.headings import heading_of, time_unit
 from simgap.data.kinds import kind_of
+from simgap.data.loading import read
 from simgap.units import of_motion, quantity, seconds_in
 
 ROWS = 50
@@ -182,3 +183,21 @@ def test_the_kind_of_a_registered_data_set_or_a_folder_may_be_said(good):
 )  # fmt: skip
 def test_a_unit_of_a_motion_says_what_it_is_in_si(unit, kind, factor):
     assert of_motion(unit) == (kind, pytest.approx(factor))
+
+
+@pytest.mark.parametrize(("heading", "said"), [("t", True), ("seconds", False), ("time_s", False), ("time [s]", False)])
+def test_a_slow_time_is_taken_for_seconds_aloud_unless_its_heading_says_so(heading, said):
+    log = frame(t=heading)
+    log[heading] *= 20.0
+    assert any("taken for seconds" in text for text in read(log, ["u"], ["y"]).said) == said
+
+
+def test_milliseconds_since_1970_are_no_seconds_whatever_the_heading_says(refused):
+    log = frame(t="time [s]")
+    log["time [s]"] = 1714557600000 + 10 * np.arange(ROWS)
+    assert "is no time of a record; correct the unit in the heading" in refused(log, ["u"], ["y"])
+
+
+def test_a_time_that_is_named_as_an_input_is_told_to_be_the_time(refused):
+    assert "'t' is the time, and cannot be an input or output" in refused(frame(), ["t"], ["y"], split_gaps=True)
+    assert len(load(frame(), ["t"], ["y"], dt=0.1).channels.inputs) == 1

@@ -79,7 +79,7 @@ def test_a_long_plain_file_is_left_to_pandas(lines, ending, tmp_path, monkeypatc
         ("59.99,1e999,1", "column 'u': inf is no measurement"),
         ("59.99,1 2,1", "column 'u': '1 2' is not a number"),
         ("59.99,1", "ends before column 'phi'"),
-        ("59.99,1,2,3", "has 1 more cells after column 'phi'"),
+        ("59.99,1,2,3", "has one more cell after column 'phi', which has no name; name it, or remove it"),
         ("", "is empty; delete it"),
         (f"59.99,{'0' * 131_072}1,1", "is no CSV: field larger than field limit"),
     ],
