@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from simgap.diagnosis.doubts import ENOUGH
+from simgap.greybox.held_out import BLOCKS
 from simgap.greybox.machine_baseline import spread
 from simgap.greybox.samples import PIECE, excerpts, is_cut
 from simgap.records import Dataset
 from simgap.wording import amount
-
-SHORT = 200  # training samples; with fewer, weak effects do not stand out from noise
 
 
 def limitations(dataset: Dataset) -> tuple[str, ...]:
@@ -17,7 +17,7 @@ def limitations(dataset: Dataset) -> tuple[str, ...]:
     training = dataset.training
     sentences = []
     samples = sum(map(len, training.train))
-    if samples < SHORT:
+    if BLOCKS <= samples < ENOUGH:
         sentences.append(f"There are only {samples} training samples: weak effects cannot be told from noise.")
     if not training.without_mere_starts().valid:
         sentences.append("There are no validation data: effects were accepted on the training data alone.")

@@ -89,14 +89,14 @@ def _read(
 def _diagnose(dataset: Dataset, seed: int, profiles: bool, views_too: bool) -> Diagnosis:
     """Diagnose the plain linear model."""
     training = dataset.training
-    controller = doubts.shows_controller((*training.train, *training.valid), dataset.channels)
-    identified = identify(training, effects=controller is None)
+    hopeless = doubts.of_records(training, dataset.channels)
+    identified = identify(training, effects=hopeless is None)
     dataset = dataset.with_channels(channels_of(identified, training))
     plain = GreyBoxModel([one.plain for one in identified])
     before = [gains.free_run(plain, x, dataset.n_init) for x in dataset.test]
     stage("Weighing the evidence")
     evidence = [Evidence(one, dataset.channels) for one in identified]
-    doubt = (controller,) if controller else _doubt(evidence, dataset.channels)
+    doubt = (hopeless,) if hopeless else _doubt(evidence, dataset.channels)
     shares, offers = _left(evidence, dataset)
     trusted = [plant for plant in map(promises.rests_on, evidence) if plant]
     endless = len(trusted) < len(evidence)

@@ -10,18 +10,27 @@ from jaxtyping import Float
 from simgap.greybox import dynamics
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
-from simgap.greybox.held_out import in_most
+from simgap.greybox.held_out import BLOCKS, in_most
 from simgap.greybox.identification import Identified
 from simgap.greybox.samples import PIECE
 from simgap.greybox.selection import Selection
 from simgap.greybox.trial import has_pieces, squares_in_pieces
-from simgap.records import Channels, Experiment
+from simgap.records import Channels, Experiment, TrainingSet
 
 # Share of the changes of one signal that repeat those of the other in the same sample.
 TOGETHER = 0.5
 ALIKE = 0.98
 FEW = 100  # samples
+ENOUGH = 200  # training samples; with fewer, weak effects do not stand out from noise
 CERTAIN = 2.0  # standard errors of a correlation
+
+
+def of_records(training: TrainingSet, channels: Channels) -> str | None:
+    """Tell in a sentence why no effect is looked for in these records, whatever a model makes of them."""
+    samples = sum(map(len, training.train))
+    if samples < BLOCKS:  # a model is judged by as many blocks
+        return f"There are only {samples} training samples, which tell no cause; record {ENOUGH} or more."
+    return shows_controller((*training.train, *training.valid), channels)
 
 
 def shows_controller(experiments: Sequence[Experiment], channels: Channels) -> str | None:

@@ -97,7 +97,7 @@ def choose_record(
     dataset = with_known(with_kinds(dataset, kind), known)
     given = candidates if isinstance(candidates, Mapping) else read_candidates(Path(candidates), dataset)
     training = dataset.training
-    if doubt := doubts.shows_controller((*training.train, *training.valid), dataset.channels):
+    if doubt := doubts.of_records(training, dataset.channels):
         raise UnusableInput(f"{dataset.name}: {doubt}")
     with all_cores():
         return ranked(dataset, identify(training), given)

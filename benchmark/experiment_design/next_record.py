@@ -45,7 +45,7 @@ def next_record(
     dataset = with_known(with_kinds(dataset, kind), known)
     limits = limits_of(dataset, input_range, rate, seconds, travel)
     training, channels = dataset.training, dataset.channels
-    doubt = doubts.shows_controller((*training.train, *training.valid), channels)
+    doubt = doubts.of_records(training, channels)
     if doubt:
         return NextRecord(dataset.name, channels, limits, (), None, doubt=doubt)
     with all_cores():

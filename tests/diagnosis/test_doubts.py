@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simgap.diagnosis.diagnose import diagnose
-from simgap.diagnosis.doubts import shows_controller
+from simgap.diagnosis.doubts import of_records, shows_controller
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet
 
 CHANNELS = Channels((Channel("op", "%"),), (Channel("pv", "m", "level"),))
@@ -83,3 +83,11 @@ def test_an_output_that_never_moves_is_said_to_stand_still(level):
     answer = diagnose(Dataset("still", training, (still[4],), 10, channels), views_too=False)
     assert not answer.causes
     assert any("y never moves. Check the sensor" in sentence for sentence in answer.findings.doubts)
+
+
+@pytest.mark.parametrize(("samples", "short"), [(19, True), (20, False)])
+def test_of_fewer_samples_than_a_model_is_judged_by_the_first_sentence_says_so(samples, short):
+    u = np.random.default_rng(0).normal(size=(samples, 1))
+    training = TrainingSet((Experiment("e", u, np.random.default_rng(1).normal(size=(samples, 1)), 1.0),), (), 2, CHANNELS)
+    said = of_records(training, CHANNELS) or ""
+    assert ("only 19 training samples, which tell no cause; record 200 or more" in said) == short
