@@ -50,7 +50,8 @@ def descend(
 
     Where all of theta is `fixed`, every experiment is a fit of its own, so that none changes another's. A fit ends
     when the gain that the quadratic model promises is below `tolerance` of the variance of the noise, so that
-    twice the log-likelihood is known to about `tolerance`.
+    twice the log-likelihood is known to about `tolerance`. Readings in steps are fitted by the quantity that is read:
+    their squares are flat between jumps, and would be the least where chance has turned the fewest readings wrong.
     """
     plant = problem.plant
     free = plant.free if fixed is None else plant.free & ~fixed
@@ -62,8 +63,9 @@ def descend(
         local = problem.better_start(theta, local)
     descent = _Together(problem, theta, local, free) if free.any() else _OneByOne(problem, theta, local)
     converged = minimise(descent, max_steps, tolerance)
-    squares = problem.squares(descent.errors)
-    return Estimate(plant, descent.theta, descent.local, descent.errors, squares, bool(converged.all()))
+    errors = problem.errors(descent.theta, descent.local) if plant.reads_in_steps else descent.errors
+    squares = problem.squares(errors)
+    return Estimate(plant, descent.theta, descent.local, errors, squares, bool(converged.all()))
 
 
 def best_descent(
@@ -88,7 +90,7 @@ class _Together:
 
     def __init__(self, problem: Problem, theta: np.ndarray, local: np.ndarray, free: np.ndarray) -> None:
         self.problem, self.theta, self.local, self.free = problem, theta, local, free
-        self.errors = problem.errors(theta, local)
+        self.errors = problem.errors(theta, local, steps=False)
         self.squares = np.array([problem.squares(self.errors)])
         self.samples = np.array([problem.records.samples * problem.plant.ny])
 
@@ -110,7 +112,7 @@ class _Together:
         (step, local_step), _ = self._normal.step(self._inside, float(damping[0]))
         theta = np.clip(self.theta + step, self.problem.plant.low, self.problem.plant.high)
         local = self.problem.within_reach(self.local + local_step)
-        errors = self.problem.errors(theta, local)
+        errors = self.problem.errors(theta, local, steps=False)
         self._attempted = theta, local, errors
         return np.array([self.problem.squares(errors)])
 
@@ -126,7 +128,7 @@ class _OneByOne:
 
     def __init__(self, problem: Problem, theta: np.ndarray, local: np.ndarray) -> None:
         self.problem, self.theta, self.local = problem, theta, local
-        self.errors = problem.errors(theta, local)
+        self.errors = problem.errors(theta, local, steps=False)
         self.squares = problem.squares_of_each(self.errors)
         self.samples = np.maximum(1, problem.records.mask.sum(axis=1)) * problem.plant.ny
 
@@ -145,7 +147,7 @@ class _OneByOne:
         normal = self._normal.only(np.searchsorted(self._groups, groups))
         problem = self.problem.only(groups)
         local = problem.within_reach(self.local[groups] + normal.steps_of_each(damping))
-        errors = problem.errors(self.theta, local)
+        errors = problem.errors(self.theta, local, steps=False)
         squares = problem.squares_of_each(errors)
         self._attempted = groups, local, errors
         return squares

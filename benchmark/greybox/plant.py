@@ -102,6 +102,11 @@ class Plant:
         return MAX_TERMS if self.machine is None else MOST_OF_A_MACHINE
 
     @property
+    def reads_in_steps(self) -> bool:
+        """Whether a reading comes in steps."""
+        return any(term.effect.in_steps for term in self.terms)
+
+    @property
     def sign_hidden(self) -> bool:
         """Whether a reading does not tell on which side of zero it is."""
         return any(term.effect.hides_sign for term in self.terms)

@@ -63,9 +63,12 @@ class Problem:
             else Problem(self.plant, self.records.only(experiments), self.noise)
         )
 
-    def errors(self, theta: np.ndarray, local: np.ndarray) -> Float[np.ndarray, "E T ny"]:
-        """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound."""
-        errors = self._where_measured(self.records.y - self.simulator.run(theta, local))
+    def errors(self, theta: np.ndarray, local: np.ndarray, *, steps: bool = True) -> Float[np.ndarray, "E T ny"]:
+        """Compute measured minus simulated; 0 where nothing was measured, and never beyond a bound.
+
+        Without `steps` what is simulated is the quantity before a sensor reads it in steps.
+        """
+        errors = self._where_measured(self.records.y - self.simulator.run(theta, local, steps=steps))
         if not np.max(np.abs(errors), initial=0.0) < LARGEST_ERROR * self._sizes.min():  # nor when it is not a number
             largest = LARGEST_ERROR * self._sizes
             errors = np.clip(np.where(np.isnan(errors), largest, errors), -largest, largest)

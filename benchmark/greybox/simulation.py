@@ -210,9 +210,11 @@ class Simulator:
             return v, v
         return states[..., 0], states[..., min(1, self.plant.order - 1)]
 
-    def run(self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"]) -> Float[np.ndarray, "E T ny"]:
+    def run(
+        self, theta: Float[np.ndarray, " p"], local: Float[np.ndarray, "E q"], *, steps: bool = True
+    ) -> Float[np.ndarray, "E T ny"]:
         """Simulate the outputs; local holds the initial state and the per-experiment parameters."""
-        return self.run_many(theta[None], local[None])[0]
+        return self.run_many(theta[None], local[None], steps=steps)[0]
 
     def run_many(
         self, thetas: Float[np.ndarray, "S p"], locals_: Float[np.ndarray, "S E q"], *, steps: bool = True

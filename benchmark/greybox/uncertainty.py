@@ -44,8 +44,10 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     freedom (Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017).
     """
     plant, theta = estimate.plant, estimate.theta
-    jacobian = Problem(plant, records, noise).jacobian(theta, estimate.local, plant.free)
-    white = noise.whiten(estimate.errors).reshape(len(estimate.local), -1)  # [E, M]
+    problem = Problem(plant, records, noise)
+    jacobian = problem.jacobian(theta, estimate.local, plant.free)
+    errors = problem.errors(theta, estimate.local, steps=False) if plant.reads_in_steps else estimate.errors
+    white = noise.whiten(errors).reshape(len(estimate.local), -1)  # [E, M]
     if not jacobian.finite:
         return None
     normal = NormalEquations.of(jacobian, white)
@@ -70,13 +72,11 @@ def uncertainty(estimate: Estimate, noise: Noise, records: Records) -> Uncertain
     moved = np.concatenate(g) @ root / scale  # [blocks, p]
     share = np.concatenate(samples) / measured.sum()
     freedom = max(1, records.samples * plant.ny - int(inside.sum()) - estimate.local.size)
-    least = records.samples * float(np.sum((records.resolution / noise.deviations) ** 2))  # of readings in steps
-    of_white = max(float(np.vdot(white, white)), least) / freedom * np.sum((root / scale) ** 2, axis=0)
+    of_white = float(np.vdot(white, white)) / freedom * np.sum((root / scale) ** 2, axis=0)
     of_blocks = np.sum(moved**2, axis=0)
     wider = np.sqrt(np.maximum(1.0, of_white / np.where(of_blocks > 0, of_blocks, np.inf)))
     covariance = np.zeros((len(theta), len(theta)))
-    unmoved = np.diag(np.where(of_blocks > 0, 0.0, of_white))  # no error at all
-    covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider) + unmoved
+    covariance[np.ix_(inside, inside)] = (moved * wider).T @ (moved * wider)
     return Uncertainty(covariance, max(2.0, 1 / np.sum(share**2) - 1))
 
 

@@ -88,6 +88,8 @@ def test_an_output_that_never_moves_is_said_to_stand_still(level):
 @pytest.mark.parametrize(("samples", "short"), [(19, True), (20, False)])
 def test_of_fewer_samples_than_a_model_is_judged_by_the_first_sentence_says_so(samples, short):
     u = np.random.default_rng(0).normal(size=(samples, 1))
-    training = TrainingSet((Experiment("e", u, np.random.default_rng(1).normal(size=(samples, 1)), 1.0),), (), 2, CHANNELS)
+    training = TrainingSet(
+        (Experiment("e", u, np.random.default_rng(1).normal(size=(samples, 1)), 1.0),), (), 2, CHANNELS
+    )
     said = of_records(training, CHANNELS) or ""
     assert ("only 19 training samples, which tell no cause; record 200 or more" in said) == short
