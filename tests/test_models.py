@@ -25,7 +25,14 @@ def test_every_model_keeps_the_contract(check, model):
     check(model)
 
 
-@pytest.mark.parametrize("name", ["narx", "sindy", "kernel-narx", "n4sid", "hammerstein", "gru"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "narx",
+        "gru",
+        *(pytest.param(x, marks=pytest.mark.slow) for x in ("sindy", "kernel-narx", "n4sid", "hammerstein")),
+    ],
+)
 def test_validation_records_that_are_no_longer_than_the_start_count_as_none(name):
     data = gimbal_short().training
     short = replace(data, valid=tuple(x[: data.n_init] for x in data.valid))

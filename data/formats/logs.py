@@ -16,6 +16,7 @@ from simgap.data.formats.tables import Table
 from simgap.records import UnusableInput
 
 ENDINGS = (".csv", ".mat", ".parquet", ".txt", ".tsv", ".dat")  # of files of one record; any name may be one
+TEXTS = ("readme", "license", "licence")  # names of files that hold none, whatever their ending
 
 
 def is_described(folder: Path) -> bool:
@@ -29,11 +30,11 @@ def logs_of(folder: Path) -> list[Path]:
     Raises UnusableInput where there is none.
     """
     with suppress(OSError):  # of a folder that may not be read
-        files = [file for file in folder.iterdir() if file.is_file() and not file.name.startswith(".")]
+        files = _that_may_be_logs(folder)
         for ending in ENDINGS:
             found = [file for file in files if file.suffix.lower() == ending]
             if found:
-                return sorted(found, key=lambda file: natural_order(file.name))
+                return found
     raise UnusableInput(
         f"{folder} holds no {FILE} and no CSV file; give a folder of CSV files with the same columns, or a single one"
     )
@@ -42,9 +43,14 @@ def logs_of(folder: Path) -> list[Path]:
 def not_read(folder: Path) -> tuple[str, ...]:
     """Say which files of a folder are left out although their ending is that of a log."""
     read = logs_of(folder)
-    left = [file for file in folder.iterdir() if file.is_file() and file.suffix.lower() in ENDINGS and file not in read]
-    names = sorted((file.name for file in left if not file.name.startswith(".")), key=natural_order)
+    names = [file.name for file in _that_may_be_logs(folder) if file not in read]
     return (f"without {', '.join(names[:3])}{', ..' if names[3:] else ''}",) if names else ()
+
+
+def _that_may_be_logs(folder: Path) -> list[Path]:
+    files = (file for file in folder.iterdir() if file.suffix.lower() in ENDINGS and file.is_file())
+    logs = (file for file in files if not file.name.startswith(".") and file.stem.casefold() not in TEXTS)
+    return sorted(logs, key=lambda file: natural_order(file.name))
 
 
 def record_of_logs(tables: Sequence[Table], choices: Choices) -> OneRecord:

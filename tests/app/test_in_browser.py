@@ -58,6 +58,7 @@ def take(page, link: str, folder):
     return file
 
 
+@pytest.mark.slow
 def test_a_dropped_record_is_corrected_and_diagnosed_and_its_model_simulates(tab, tmp_path):
     # Its heading says that v is an angle, which would make it a position.
     write_cart(tmp_path / "cart.csv", samples=400, heading="t,force [N],v [rad]")
@@ -102,6 +103,7 @@ def test_a_dropped_record_is_corrected_and_diagnosed_and_its_model_simulates(tab
     assert page.get_by_label("Unit of v").input_value() == "m/s"  # what was said is still there
 
 
+@pytest.mark.slow
 def test_an_uneven_record_is_interpolated_where_that_is_asked_for(tab, tmp_path):
     write_cart(tmp_path / "cart.csv", samples=60)
     lines = (tmp_path / "cart.csv").read_text().splitlines()
@@ -185,6 +187,7 @@ def test_two_tabs_diagnose_at_once_and_each_gets_its_own_answer(tab, tmp_path):
     assert "Coulomb friction" in pages[0].locator("h1").inner_text()
 
 
+@pytest.mark.slow
 def test_several_files_are_logs_of_one_machine(tab, tmp_path):
     for k in range(3):
         write_cart(tmp_path / f"run{k}.csv", samples=300, seed=k)

@@ -46,6 +46,11 @@ def test_what_else_of_a_folder_might_be_a_log_is_said_to_be_left_out(logs):
     assert "without log11.tsv, notes.txt" in read(logs, **COLUMNS).said
 
 
+def test_a_folder_with_nothing_but_a_readme_holds_no_log(tmp_path, refused):
+    (tmp_path / "README.txt").write_text("The logs are on the other disk.")
+    assert "and no CSV file; give a folder of CSV files" in refused(tmp_path, ["u"], ["y"])
+
+
 def test_logs_that_are_named_one_by_one_are_one_record_in_that_order(logs, capsys):
     files = [str(logs / f"log{k}.csv") for k in (5, 2, 7, 1, 9)]
     data = load(files, **COLUMNS)

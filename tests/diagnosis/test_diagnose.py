@@ -42,7 +42,8 @@ def test_an_effect_that_is_hidden_in_a_rig_is_named_first_or_suspected_if_the_re
     assert outcome.right or unsure or not outcome.visible, outcome
 
 
-@pytest.mark.parametrize("colour", [pytest.param(0.0, marks=pytest.mark.slow), 0.9])
+@pytest.mark.slow
+@pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_where_nothing_is_hidden_nothing_is_named(colour):
     seed = secrets.randbits(20)
     assert diagnose(hide("stage", {}, noise=0.1, colour=colour, seed=seed)).verdict == "nothing_found", seed
@@ -157,7 +158,7 @@ def test_one_long_record_with_several_inputs_and_outputs_is_diagnosed():
     assert "at valve, in left" in " ".join(diagnosis.to_html().split())
 
 
-@pytest.mark.parametrize("effect", ["dead_zone", "coulomb_friction"])
+@pytest.mark.parametrize("effect", ["dead_zone", pytest.param("coulomb_friction", marks=pytest.mark.slow)])
 def test_the_diagnosis_examples_of_the_command_line_are_solved(measured, effect):
     truth = json.loads((measured / "diagnosis_examples" / "truth.json").read_text())
     for name, known in truth.items():
@@ -170,12 +171,13 @@ def test_every_effect_can_be_hidden_somewhere():
     assert everywhere == set(simgap.EFFECTS.names())
 
 
-@pytest.mark.parametrize("rig", ["cart", "stage"])
+@pytest.mark.parametrize("rig", ["cart", pytest.param("stage", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("effect", ["load_drift", "sensor_drift"])
 def test_a_load_and_a_sensor_that_drift_in_a_line_are_told_apart(rig, effect):
     assert [cause.effect for cause in diagnose(hide(rig, {effect: 1.0}, seed=3)).findings.causes] == [effect]
 
 
+@pytest.mark.slow
 def test_a_load_that_comes_and_goes_in_every_record_is_named():
     rng, dt, records = np.random.default_rng(0), 0.1, []
     for k in range(12):

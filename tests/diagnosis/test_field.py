@@ -30,7 +30,7 @@ def named(answer):
         # The mean input that holds the load drives the plain axis away, and no descent leads back from its poles.
         pytest.param("axis", {"constant_load": 1.0}, 0.01, 0.8, 702003, marks=pytest.mark.slow),
         pytest.param("axis", {"constant_load": 1.0}, 0.01, 0.8, 810009, marks=pytest.mark.slow),
-        ("pendulum", {"gravity": 0.5}, 0.02, 0.0, 115),
+        pytest.param("pendulum", {"gravity": 0.5}, 0.02, 0.0, 115, marks=pytest.mark.slow),
         # It turns over, and no linear model follows it.
         pytest.param("pendulum", {"gravity": 1.0}, 0.05, 0.0, 206000, marks=pytest.mark.slow),
     ],

@@ -9,8 +9,8 @@ import pytest
 GOLDEN = runpy.run_path(str(Path(__file__).with_name("golden.py")))
 # More than five seconds each.
 SLOW = (
-    "slide-delay", "slide-hysteresis", "slide-outside-force", "slide-pair", "stage-absolute", "stage-backlash",
-    "stage-cubic", "stage-torque", "tank-sqrt", "tanks-drift", "tanks-overflow",
+    "cart-stribeck", "slide-delay", "slide-hysteresis", "slide-outside", "slide-outside-force", "slide-pair",
+    "stage-absolute", "stage-backlash", "stage-cubic", "stage-torque", "tank-sqrt", "tanks-drift", "tanks-overflow",
 )  # fmt: skip
 
 

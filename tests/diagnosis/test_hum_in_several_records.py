@@ -57,7 +57,10 @@ def test_beside_hum_a_friction_has_its_true_size():
     assert sizes["coulomb_friction"] == pytest.approx(6.0, rel=0.05)
 
 
-@pytest.mark.parametrize(("damping", "seed"), [(0.01, 0), (0.002, 0), (0.002, 1)])
+@pytest.mark.parametrize(
+    ("damping", "seed"),
+    [(0.002, 0), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.01, 0), (0.002, 1)))],
+)
 def test_a_light_mode_that_inputs_and_starts_excite_is_no_hum(damping, seed):
     found = diagnose(dataset([800] * 6, seed, damping=damping), views_too=False).findings
     assert "periodic_disturbance" not in {cause.effect for cause in found.effects + found.suspects}

@@ -138,6 +138,7 @@ def test_a_search_that_was_stopped_is_trusted_for_the_few_effects_that_take_near
     assert trusted(shares) == count
 
 
+@pytest.mark.slow
 def test_a_name_that_is_withdrawn_is_told_beside_the_one_that_stays(two_effects, monkeypatch):
     low = iter([-0.1, 0.1])
     real = gains.measure

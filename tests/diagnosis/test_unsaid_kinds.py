@@ -52,6 +52,7 @@ def test_a_card_left_out_changes_neither_verdict_nor_first_name(rig, effect):
     assert told(diagnose(without_card(data), views_too=False)) == told(diagnose(data, views_too=False))
 
 
+@pytest.mark.slow
 def test_a_file_with_meaningless_headings_gets_the_answer_that_it_gets_where_the_kind_is_said(tmp_path):
     data = hide("cart", {"coulomb_friction": 1.0}, 0.05, seed=7)
     with (tmp_path / "motor.csv").open("w", newline="") as file:

@@ -67,7 +67,8 @@ def oscillated(u, fine=10):
     return np.stack(x, axis=1)
 
 
-@pytest.mark.parametrize(("samples", "left_out"), [(1000, 0), pytest.param(1600, 100, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("samples", "left_out"), [(1000, 0), (1600, 100)])
 def test_the_oscillator_of_the_benchmark_is_recovered_from_rest_and_in_motion(samples, left_out):
     rng = np.random.default_rng(0)
     f = np.fft.rfftfreq(samples, 1 / RATE)

@@ -103,11 +103,12 @@ def of_velocity(respond, seed):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("respond", "name", "number"),
     [
         (lambda v: 0.1 * v + 3.0 * np.sign(v), "coulomb_friction", 3.0),
-        pytest.param(lambda v: 0.1 * v + 0.002 * v * np.abs(v), "quadratic_drag", 0.002, marks=pytest.mark.slow),
+        (lambda v: 0.1 * v + 0.002 * v * np.abs(v), "quadratic_drag", 0.002),
     ],
 )
 def test_of_a_machine_whose_velocity_is_imposed_the_force_is_named_with_its_size(respond, name, number):

@@ -74,6 +74,7 @@ def test_the_intervals_of_a_machine_hold_the_truth_where_one_short_record_tells_
     assert (held >= binom.ppf(1e-4, SEEDS, 0.95)).all(), held
 
 
+@pytest.mark.slow
 def test_the_intervals_hold_the_truth_where_one_record_is_long_and_many_are_short():
     """Blocks are cut by samples: else a record of 4000 would be one draw of forty."""
     rng, held, seeds = np.random.default_rng(4), np.zeros(2), 20

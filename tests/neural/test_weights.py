@@ -11,7 +11,7 @@ from simgap.registry import MODELS
 NETWORKS = [name for name in MODELS if isinstance(MODELS[name], type) and issubclass(MODELS[name], Network)]
 
 
-@pytest.mark.parametrize("mode", ["windowed", "stateful"])
+@pytest.mark.parametrize("mode", [pytest.param("windowed", marks=pytest.mark.slow), "stateful"])
 @pytest.mark.parametrize("name", NETWORKS)
 def test_a_network_that_was_saved_simulates_the_same(name, mode, data, simulated):
     model = MODELS[name](mode=mode, window=16, epochs=1, batches=2)
