@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from simgap.records import UnusableInput
 
 LONG = 1 << 18  # bytes; a shorter file is read before pandas is imported
 PLAIN = "".join(NUMBER_CHARACTERS).encode() + b",\n"
+WITHIN = re.compile(rb"[eE+-] |[0-9.] +[eE.]")  # a space that pandas overlooks within a number
 STAMPS = b":TZ"  # what dates and times of day have besides
 
 
@@ -75,7 +77,7 @@ def _with_commas(body: bytes, layout: Layout) -> bytes:
 def _dates(body: bytes) -> list[int] | None:
     """Find the columns of dates by the first row; None where the samples hold more than numbers and dates."""
     odd = body.translate(None, PLAIN)
-    if odd.translate(None, STAMPS):
+    if odd.translate(None, STAMPS) or WITHIN.search(body):
         return None
     first = body.partition(b"\n")[0].split(b",") if odd else []
     return [i for i, cell in enumerate(first) if cell.translate(None, STAMPS) != cell]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from simgap.data import load
@@ -47,6 +47,8 @@ def answer(read, content: bytes):
     odd=st.one_of(st.just(""), ODD),
     where=st.floats(0, 1),
 )
+@example(rows=[("0.0", "+0E 0")], ending="\n", last=0, odd="", where=0.0)
+@example(rows=[("0.0", "1 e3")], ending="\n", last=0, odd="", where=0.0)
 def test_both_readers_give_one_answer(rows, ending, last, odd, where):
     text = ending.join(["u, phi", *(",".join(row) for row in rows)]) + last * ending
     at = round(where * len(text))
