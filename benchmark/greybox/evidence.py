@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from simgap.error_views.correlation import correlation_time
-from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
-from simgap.findings import Cause, Profile, Separation, Value
+from simgap.findings import Cause, Profile, Value
+from simgap.greybox.deciding import deciding_experiment, separation
 from simgap.greybox.effects.effect import Effect
 from simgap.greybox.effects.outliers import Outliers as OutlierEffect
 from simgap.greybox.fitting import descend
@@ -22,7 +21,7 @@ from simgap.greybox.problem import Problem
 from simgap.greybox.selection import Selection
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, significant
-from simgap.records import Channels, Kind
+from simgap.records import Channels
 
 # Two sets of effects whose scores (log-likelihood, less what the parameters cost) differ by less are not told apart.
 CONFOUNDED = 6.0
@@ -239,58 +238,3 @@ class Evidence:
 def gained(smaller: Trial, larger: Trial) -> float:
     """Return the share of the held-out squared error that the larger model takes away."""
     return float(1 - larger.blocks.sum() / smaller.blocks.sum())
-
-
-# How an error behaves that each view shows.
-ERROR_THAT: dict[ViewName, str] = {
-    "offset": "is the same everywhere",
-    "time since the start": "changes with the time since the start of each experiment",
-    "drift within experiment": "drifts within each experiment",
-    "experiment": "differs from experiment to experiment",
-    "size by experiment": "is large in some experiments only",
-    "kind of experiment": "differs with the kind of experiment",
-    "size by kind of experiment": "is large in some kinds of experiment only",
-    "frequency band": "keeps to one band of frequencies",
-    "input": "depends on the size of the input",
-    "amplitude": "depends on the amplitude of the output",
-    "position": "depends on the position",
-    "level": "depends on the level",
-    "value": "depends on the value of the output",
-    "velocity": "depends on the velocity",
-    "rate of change": "depends on the rate of change of the output",
-    "sign of velocity": "depends on the direction of motion",
-    "time since reversal": "depends on the time since the last reversal",
-}
-
-
-def separation(effect: Effect, other: Effect, kind: Kind) -> Separation:
-    """Describe the experiment that would tell two effects apart on an output of this kind, as either of them knows it.
-
-    Where neither does: a richer input, if the two show in different views, and else a second sensor.
-    """
-    experiment = effect.confounders.get(other.name) or other.confounders.get(effect.name)
-    if not experiment:
-        view, of_other = most_telling(effect, kind), most_telling(other, kind)
-        experiment = (
-            f"vary the amplitude and the speed of the input more: an error that {ERROR_THAT[view]} then speaks for "
-            f"{effect.title}, one that {ERROR_THAT[of_other]} for {other.title}"
-        )
-        if view == of_other:
-            of_sensor = effect if effect.port == "output" else other
-            experiment = f"add a second sensor: only {of_sensor.title} makes the two readings differ"
-    return Separation(other.name, other.title, experiment)
-
-
-def deciding_experiment(effect: Effect, confounded: Sequence[Separation], kind: Kind) -> str:
-    """Describe the experiment that would show whether an effect is there that test data leave open."""
-    if confounded:
-        return "; ".join(other.experiment.rstrip(".") for other in confounded)
-    return (
-        "record more and longer test experiments, with inputs that bring out an error which "
-        f"{ERROR_THAT[most_telling(effect, kind)]}"
-    )
-
-
-def most_telling(effect: Effect, kind: Kind) -> ViewName:
-    """Return the first view that shows an effect among those of an output of this kind."""
-    return next(view for view in effect.shows_in if kind in VIEWS_OF_KINDS.get(view, (kind,)))

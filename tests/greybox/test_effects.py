@@ -11,9 +11,9 @@ from scipy.optimize import least_squares
 from simgap.data.simulated.rigs import CATALOGUE, RIGS, hide, physical, suitable
 from simgap.error_views.views import views
 from simgap.error_views.wrong import VIEWS_OF_KINDS, ViewName
+from simgap.greybox.deciding import ERROR_THAT, EXPERIMENTS_FOR, separation
 from simgap.greybox.effects.load_drift import LoadDrift
 from simgap.greybox.effects.scales import SignalScales
-from simgap.greybox.evidence import separation
 from simgap.records import Channel, Channels, Experiment, Kind
 from simgap.registry import EFFECTS, MODELS
 
@@ -38,6 +38,10 @@ def test_an_effect_has_texts_that_say_what_it_is_and_where_it_is_described(name)
     assert effect.port in ("input", "force", "output")
     assert len(effect.title) > 5 and len(effect.explanation) > 40 and len(effect.reference) > 15
     assert effect.shows_in
+
+
+def test_every_view_has_words_for_its_error_and_an_experiment_that_shows_it():
+    assert set(ERROR_THAT) == set(EXPERIMENTS_FOR) == set(get_args(ViewName))
 
 
 @pytest.mark.parametrize("name", EFFECTS.names())

@@ -66,7 +66,7 @@ def nothing_found(named) -> Findings:
 @pytest.fixture
 def suspected(named) -> Findings:
     """The same cart, whose test experiments do not show whether the friction is there."""
-    decide = "record more and longer test experiments, with inputs that bring out an error which depends on the speed"
+    decide = "record more and longer test experiments at several speeds, slow and fast"
     suspects = (replace(named.causes[0], confounded_with=(), deciding_experiment=decide),)
     gain = replace(named.gain, after={"x": 1.1}, share=0.113, low=-0.05, high=0.27)
     return replace(

@@ -108,7 +108,7 @@ def test_a_suspect_is_called_a_suspect_with_its_gain_and_what_would_decide(suspe
         "show that it helps: with it the free-run error falls by 11 % (-5 to 27 %). Plain linear model"
     )
     assert "Suspect 1: Coulomb friction" in text
-    assert "To decide: record more and longer test experiments, with inputs that bring out an error which" in text
+    assert "To decide: record more and longer test experiments at several speeds, slow and fast." in text
     assert "Free-run RMSE on the test experiments, with the suspects x: 1.24 -> 1.1 mm (-11 %)" in text
     assert "Cause 1" not in text
     assert "errs because" not in text
