@@ -146,9 +146,9 @@ def model_faults(step: str) -> Iterator[None]:
 
 
 def check_writable(*files: Path | None, read: Sequence[str] = ()) -> None:
-    """Raises UnusableInput, before any work is done, for a file that cannot be written or that would be lost.
+    """Raises UnusableInput, before any work is done, for a file that cannot be written, or where one would be lost.
 
-    It would where two outputs go into one file, or where it is one of what is `read`: data, models, suites.
+    Two outputs may not go into one file, and none into a file that is `read`: data, a model, a suite.
     """
     from simgap.registry import file_of
 

@@ -51,9 +51,8 @@ def find_baseline(
 ) -> Baseline:
     """Fit the plain linear model of one plant to excerpts of the experiments. Raises UnusableInput.
 
-    Single readings that are far off are left out, unless it is to be of `every_reading`.
-
-    Held-out records are simulated from their first n_init samples, as the test will be.
+    Single readings that are far off are left out, unless it is to be of `every_reading`. Held-out records are simulated
+    from their first n_init samples, as the test will be.
     """
     check_numbers([*train, *valid], channels)
     chosen = excerpts(train)
@@ -167,6 +166,7 @@ def plain_models(
     which takes a force.
     """
     kind = channels.outputs[outputs[0]].kind
+    by_rate = kind == "other" and [channel.kind for channel in channels.inputs] == ["velocity"]
     nu, dt = train.u.shape[2], train.dt
     if kind in ("position", "velocity"):
         plant = Plant(kind, 2 if kind == "position" else 1, nu, dt, two_outputs=train.y.shape[2] == 2)
@@ -193,9 +193,7 @@ def plain_models(
             tried += here
         if rounds_in_vain == 2:
             break
-    if kind == "other" and [channel.kind for channel in channels.inputs] == [
-        "velocity"
-    ]:  # beside them all: what it simulates worse or better says nothing of the next order
+    if by_rate:  # beside them all: what it simulates worse or better says nothing of the next order
         fit = fit_plain(Plant(kind, 0, nu, dt, zeros=1, offset=True, by_rate=True), train)
         tried.insert(0, (fit, block_errors(fit, valid, n_init, train)))
     fits = tuple(fit for fit, _ in tried)  # from the simplest on
