@@ -20,7 +20,7 @@ from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_from, fit_plain
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts, is_cut, quantisation_step
+from simgap.greybox.samples import Records, excerpts, is_cut
 from simgap.greybox.score_test import candidates
 from simgap.greybox.signal_scales import scales_of
 from simgap.greybox.subspace_start import linear_models, starts
@@ -60,7 +60,7 @@ def find_baseline(
     held_out = Records.of(excerpts(valid), outputs) if valid else records
     cut = is_cut(chosen, train)
     models, orders = plain_models(records, held_out, channels, outputs, n_init)
-    stepped = any(quantisation_step(records.y[..., j]) for j in range(len(outputs)))
+    stepped = records.steps.any()
     outliers = [] if stepped or every_reading else find_outliers(models[-1].errors, records.mask, records.resolution)
     if outliers:
         records = without_outliers(records, models[-1].errors, outliers)

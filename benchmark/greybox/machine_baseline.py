@@ -17,7 +17,7 @@ from simgap.greybox.noise import white, white_as_large_as
 from simgap.greybox.outliers import find_glitches, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, excerpts, is_cut, quantisation_step
+from simgap.greybox.samples import Records, excerpts, is_cut
 from simgap.greybox.signal_scales import scales_of
 from simgap.greybox.terms import PlantScales
 from simgap.records import Channels, Experiment
@@ -45,10 +45,9 @@ def find_machine_baseline(
     kind = channels.outputs[outputs[0]].kind
     plant = Plant(kind, ORDERS[kind], records.u.shape[2], records.dt, machine=machine)
     plain = fit_machine(plant, records)
-    stepped = quantisation_step(records.y[..., 0])
     # Bad readings are few, so that all records are asked for them.
     every = Records.of(train, outputs)
-    outliers = [] if stepped else find_glitches(errors_on(plain, every, n_init), every.mask)
+    outliers = [] if records.steps.any() else find_glitches(errors_on(plain, every, n_init), every.mask)
     if outliers:
         records = without_outliers(records, plain.errors, outliers)
         held_out = (

@@ -76,10 +76,14 @@ class Records:
         return RESOLUTION * self.sizes
 
     @cached_property
+    def steps(self) -> Float[np.ndarray, " ny"]:
+        """The step that the readings of each output come in; 0 where they come in none."""
+        return np.array([quantisation_step(self.y[:, :, j]) for j in range(self.y.shape[2])])
+
+    @property
     def resolution(self) -> Float[np.ndarray, " ny"]:
         """The smallest spread of a reading about what was expected of it that may count as likely, for each output."""
-        steps = [quantisation_step(self.y[:, :, j]) for j in range(self.y.shape[2])]
-        return np.maximum(self.rounding, CELL * np.array(steps))
+        return np.maximum(self.rounding, CELL * self.steps)
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""

@@ -12,7 +12,7 @@ from simgap.greybox import dynamics
 from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.problem import Problem
-from simgap.greybox.samples import Records, quantisation_step
+from simgap.greybox.samples import Records
 from simgap.greybox.terms import PlantScales
 from simgap.records import Channels
 
@@ -49,7 +49,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
             force_rms=force,
             u_unit=channels.inputs[i].unit.removesuffix(rate), y_unit=channels.outputs[outputs[j]].unit,
             lines=together, tones=whatever_phase,
-            quantisation_step=quantisation_step(records.y[:, :, j]),
+            quantisation_step=float(records.steps[j]),
         )  # fmt: skip
 
     poles = dynamics.poles(plant, estimate.theta) if plant.order else np.zeros(1)

@@ -171,8 +171,8 @@ def _told(
     about += [f"units from row {table.first_row - 1}"] if layout.units else []
     units = any(channel.unit for channel in (*channels.inputs, *channels.outputs))
     units |= any(channel.kind_from == "header" for channel in channels.outputs)
-    unsaid = clock is not None and not time_unit(clock.column, table.heading(clock.column).unit)
-    slow = clock is not None and unsaid and dt >= 1 and not clock.counts
+    heading_unit = "" if clock is None else table.heading(clock.column).unit or time_unit(clock.column)
+    slow = clock is not None and dt >= 1 and not clock.counts and not heading_unit
     if clock is not None and (about or said or units or clock.counts or slow or clock.column not in ("t", "time")):
         counts = f", which {'holds' if clock.is_dated else 'counts'} {clock.counts}" if clock.counts else ""
         counts = (

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simgap.greybox import initial_states as starts
-from simgap.greybox import noise, outliers, signal_scales, subspace_start
+from simgap.greybox import noise, outliers, samples, signal_scales, subspace_start
 from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
@@ -209,4 +209,4 @@ def lines(e, dt, since=0.0):
 
 def lattice(y):
     """Step of the grid on which all readings [E, T] lie, 0 without one."""
-    return signal_scales.quantisation_step(y)
+    return samples.quantisation_step(y)
