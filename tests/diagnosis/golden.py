@@ -46,7 +46,7 @@ MEASURED = (
 # With the likelihood profiles of all parameters.
 PROFILED = ("cart-coulomb", "stage-cubic")
 # Sentences for people, what the data set says itself, and what no two runs agree on.
-WORDS = ("text", "title", "separate_by", "checks", "kinds", "seconds")
+WORDS = ("text", "title", "separate_by", "deciding_experiment", "checks", "kinds", "seconds")
 
 
 def folder_of(name: str) -> Path:
