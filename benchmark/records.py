@@ -20,6 +20,8 @@ Status = Literal["ok", "diverged", "error", "timeout"]
 LARGEST_VALUE = 1e100
 LONGEST_NAME = 80  # of a data set, in characters
 
+LONGEST_PAST = 500  # samples: of the inputs before a record that was cut out of a run; no effect remembers many more
+
 # Relative difference of two sampling times that is the jitter of one clock: each is read off time stamps of a record.
 CLOCK_JITTER = 1e-4
 
@@ -71,7 +73,8 @@ class Experiment:
     """One uninterrupted record: u [T, nu], y [T, ny], sampled every dt seconds.
 
     The arrays are float64, two-dimensional and read-only. `experiment[a:b]` is the record of those samples, which
-    knows for how long the machine had run before them: `since`, in seconds.
+    knows what came before them: for how long the machine had run, `since`, in seconds, and its last inputs, `before`
+    [P, nu], the newest last; P is 0 where the run begins, and never above 500.
     Raises UnusableInput when the shapes do not fit, dt is not positive, or a value is not finite.
     """
 
@@ -80,13 +83,16 @@ class Experiment:
     y: Float[np.ndarray, "T ny"]
     dt: float
     since: float = 0.0
+    before: Float[np.ndarray, "P nu"] = None  # type: ignore[assignment]  # filled in below for a whole run
 
     def __post_init__(self) -> None:
-        for column in ("u", "y"):
+        if self.before is None:
+            object.__setattr__(self, "before", np.asarray(self.u)[:0])
+        for column, shape in (("u", "[T, nu]"), ("y", "[T, ny]"), ("before", "[P, nu]")):
             values = np.asarray(getattr(self, column), dtype=np.float64).view()
             if values.ndim != 2:
                 raise UnusableInput(
-                    f"{self.name}: {column} has {values.ndim} dimensions; give rows of samples, [T, n{column}]"
+                    f"{self.name}: {column} has {values.ndim} dimensions; give rows of samples, {shape}"
                 )
             # The extremes of an array with a NaN are NaN, and need no copy of a long record.
             if values.size and not (values.min() >= -LARGEST_VALUE and values.max() <= LARGEST_VALUE):
@@ -101,6 +107,8 @@ class Experiment:
             raise UnusableInput(
                 f"{self.name}: u has {len(self.u)} samples and y has {len(self.y)}; cut them to the same length"
             )
+        if self.before.shape[1] != self.u.shape[1]:
+            raise UnusableInput(f"{self.name}: {self.before.shape[1]} inputs before it and {self.u.shape[1]} in it")
         object.__setattr__(self, "dt", float(self.dt))
         if not (0 < self.dt < np.inf):
             raise UnusableInput(f"{self.name}: the sampling time is {self.dt} s; it must be positive")
@@ -110,13 +118,14 @@ class Experiment:
 
     def __reduce__(self) -> tuple[type[Experiment], tuple[Any, ...]]:
         """Arrays come out of a pickle writable; made anew, they are not."""
-        return type(self), (self.name, self.u, self.y, self.dt, self.since)
+        return type(self), (self.name, self.u, self.y, self.dt, self.since, self.before)
 
     def __getitem__(self, samples: slice) -> Experiment:
         if not isinstance(samples, slice) or samples.step not in (None, 1):
             raise TypeError("an experiment is cut with a plain slice such as experiment[100:200]")
-        since = self.since + self.dt * samples.indices(len(self))[0]
-        return Experiment(self.name, self.u[samples], self.y[samples], self.dt, since)
+        first = samples.indices(len(self))[0]
+        before = np.concatenate((self.before, self.u[max(0, first - LONGEST_PAST) : first]))[-LONGEST_PAST:]
+        return Experiment(self.name, self.u[samples], self.y[samples], self.dt, self.since + self.dt * first, before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +168,10 @@ class TrainingSet:
         return replace(self, valid=tuple(x for x in self.valid if len(x) > self.n_init))
 
     def as_runs(self) -> TrainingSet:
-        """Return the same records as if each were a run of its own, for models that are not told the time."""
-        train, valid = (tuple(replace(x, since=0.0) for x in records) for records in (self.train, self.valid))
+        """Return the same records as if each were a run of its own, for models that are not told what came before."""
+        train, valid = (
+            tuple(replace(x, since=0.0, before=None) for x in records) for records in (self.train, self.valid)
+        )
         return replace(self, train=train, valid=valid)
 
 

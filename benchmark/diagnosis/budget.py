@@ -19,6 +19,7 @@ from simgap.diagnosis.repeats import variance_of_repeats
 from simgap.findings import Budget
 from simgap.greybox.evidence import Evidence
 from simgap.greybox.model import FittedPlant, GreyBoxModel
+from simgap.greybox.past import Past
 from simgap.greybox.rest import learn
 from simgap.greybox.samples import sizes_of
 from simgap.greybox.terms import Term
@@ -45,7 +46,7 @@ def budgets(
     model, after = (named.model, named.after) if named else (plain, before)
     n, rest = dataset.n_init, learn(model, seed)
     learnt = [
-        y_hat + rest.predict(x.u[None], model.simulate_whole(x.u[None], x.y[None, :n], np.array([x.since])))[0, n:]
+        y_hat + rest.predict(x.u[None], model.simulate_whole(x.u[None], x.y[None, :n], Past.of([x])))[0, n:]
         for x, y_hat in zip(dataset.test, after, strict=True)
     ]
     of_plain, of_named = _mse(dataset, before), _mse(dataset, after)

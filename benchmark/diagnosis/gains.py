@@ -13,6 +13,7 @@ from simgap.error_views.correlation import correlation_time
 from simgap.error_views.gain_interval import share_with_interval
 from simgap.findings import Gain, InPieces
 from simgap.greybox.model import GreyBoxModel
+from simgap.greybox.past import Past
 from simgap.greybox.samples import PIECE, sizes_of
 from simgap.metrics import is_finite, relative, spread
 from simgap.records import Dataset, Experiment
@@ -25,7 +26,7 @@ SMALLEST_ERROR = 1e-9
 
 def free_run(model: GreyBoxModel, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
     """Simulate rows n_init .. T-1 of one experiment from its first n_init samples."""
-    return model.simulate(experiment.u[None], experiment.y[None, :n_init], np.array([experiment.since]))[0]
+    return model.simulate(experiment.u[None], experiment.y[None, :n_init], Past.of([experiment]))[0]
 
 
 def measure(
@@ -67,8 +68,9 @@ def in_pieces(dataset: Dataset, plain: GreyBoxModel, model: GreyBoxModel) -> InP
     pieces = [x[a : a + PIECE] for x in dataset.test for a in range(0, len(x) - PIECE + 1, PIECE)]
     if not pieces:
         return None
-    u, y, since = (np.stack([getattr(x, signal) for x in pieces]) for signal in ("u", "y", "since"))
-    before, after = (list(one.simulate(u, y[:, : dataset.n_init], since)) for one in (plain, model))
+    u, y = (np.stack([getattr(x, signal) for x in pieces]) for signal in ("u", "y"))
+    past = Past.of(pieces)
+    before, after = (list(one.simulate(u, y[:, : dataset.n_init], past)) for one in (plain, model))
     gain = measure(replace(dataset, test=tuple(pieces)), before, after)
     return InPieces(PIECE, gain.share, gain.low, gain.high)
 

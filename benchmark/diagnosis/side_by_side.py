@@ -134,7 +134,7 @@ class SideBySide:
 
 def _training_run(fitted: FittedPlant) -> Float[np.ndarray, "E T ny"]:
     estimate = fitted.estimate
-    return Simulator(estimate.plant, fitted.records.u, fitted.records.since).run(estimate.theta, estimate.local)
+    return Simulator(estimate.plant, fitted.records.u, fitted.records.past).run(estimate.theta, estimate.local)
 
 
 def _error(machine: FittedPlant, simulated: Sequence[Experiment], n_init: int) -> Float[np.ndarray, "E T ny"]:

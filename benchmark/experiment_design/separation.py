@@ -10,6 +10,7 @@ from jaxtyping import Float
 from simgap.experiment_design.rivals import Question, Rival
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import scales_of
+from simgap.greybox.past import Past
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
 from simgap.greybox.simulation import Simulator
@@ -117,5 +118,5 @@ def _with_one_more(records: Records, u: np.ndarray, y: np.ndarray) -> Records:
     mask = np.zeros((len(records.u) + 1, longest), dtype=bool)
     mask[:-1, : records.mask.shape[1]] = records.mask
     mask[-1, : len(u)] = True
-    since = np.append(records.since, 0.0)
-    return Records(joined(records.u, u), joined(records.y, y), mask, records.dt, since, records.soft)
+    past = records.past.beside(Past.none(u[None], records.past.u.shape[1]))
+    return Records(joined(records.u, u), joined(records.y, y), mask, records.dt, past, records.soft)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from simgap.greybox.effects.effect import InputEffect
+from simgap.greybox.past import Past
 from simgap.greybox.plant import Plant
 from simgap.greybox.terms import Term
 
@@ -18,21 +19,26 @@ def shifted(u: Float[np.ndarray, "E K"], steps: int) -> Float[np.ndarray, "E K"]
 
 
 class Drive:
-    """What drives one plant on the inputs of several experiments, u [E, T, nu]."""
+    """What drives one plant on the inputs of several experiments, u [E, T, nu], after what came before them."""
 
-    def __init__(
-        self, plant: Plant, u: Float[np.ndarray, "E T nu"], since: Float[np.ndarray, " E"] | None = None
-    ) -> None:
+    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"], past: Past | None = None) -> None:
         self.plant, self.substeps = plant, plant.substeps
-        self.since = np.zeros(len(u)) if since is None else since
+        past = past or Past.none(u)
+        self.since = past.since
         self.h = plant.dt / plant.substeps
-        # [nu, E, K]: each sample until the next one
-        self.u = np.ascontiguousarray(np.repeat(np.moveaxis(u, 2, 0), plant.substeps, axis=2))
+        whole = np.concatenate((past.u, u), axis=1)
+        self._first = past.u.shape[1] * plant.substeps  # of the substeps that are simulated
+        # [nu, E, P + K]: each sample until the next one
+        self._whole = np.ascontiguousarray(np.repeat(np.moveaxis(whole, 2, 0), plant.substeps, axis=2))
         self._rate: np.ndarray | None = None  # [E, K], of an imposed motion, where it is the input
         if plant.by_rate:
-            v = self._rate = self.u[0]
-            self.u = np.zeros_like(self.u)
-            self.u[0, :, 1:] = np.cumsum(0.5 * (v[:, 1:] + v[:, :-1]) * self.h, axis=1)
+            v = self._whole[0]
+            self._rate = v[:, self._first :]
+            self._whole = np.zeros_like(self._whole)
+            x = self._whole[0]
+            x[:, 1:] = np.cumsum(0.5 * (v[:, 1:] + v[:, :-1]) * self.h, axis=1)
+            x -= x[:, self._first, None]
+        self.u = self._whole[:, :, self._first :]  # [nu, E, K]
         self._arrived: dict[bytes, np.ndarray] = {}
         self._middles = self.h * (np.arange(self.u.shape[2]) + 0.5)  # of the substeps
         self._duration = plant.dt * u.shape[1]
@@ -44,8 +50,11 @@ class Drive:
             self.depends_on[part] = True
         self._inputs: np.ndarray | None = None  # [nu * taps, E * K], where nothing but gains stands before the plant
         if not effects and not self.loads and plant.machine is None:
-            taps = [shifted(one, tap * plant.substeps) for one in self.u for tap in plant.taps]
+            taps = [self._shifted(one, tap) for one in self._whole for tap in plant.taps]
             self._inputs = np.array(taps).reshape(len(taps), -1)
+
+    def _shifted(self, u: Float[np.ndarray, "E J"], samples: int) -> Float[np.ndarray, "E K"]:
+        return shifted(u, samples * self.substeps)[:, self._first :]
 
     def of(
         self, theta: Float[np.ndarray, " p"], start: Float[np.ndarray, "E m"] | None = None
@@ -60,9 +69,9 @@ class Drive:
         gains, offset = theta[plant.layout.gains], theta[plant.layout.offset]
         total = np.full(self.u.shape[1:], offset[0] if len(offset) else 0.0)
         for channel, of_channel in enumerate(gains.reshape(plant.nu, -1)):
-            arriving = self.arriving(theta, channel, start)
+            arriving = self._passed(theta, channel, start)
             for tap, gain in zip(plant.taps, of_channel, strict=True):
-                total += gain * shifted(arriving, tap * self.substeps)
+                total += gain * self._shifted(arriving, tap)
         if start is None:
             return total
         for term in self.loads:
@@ -90,22 +99,32 @@ class Drive:
     def arriving(
         self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None
     ) -> Float[np.ndarray, "E K"]:
-        """Pass one input through its effects; the answer is kept, because most parameters do not change it."""
+        """Pass one input through its effects."""
+        return self._passed(theta, channel, start)[:, self._first :]
+
+    def _passed(
+        self, theta: Float[np.ndarray, " p"], channel: int, start: Float[np.ndarray, "E m"] | None = None
+    ) -> Float[np.ndarray, "E J"]:
+        """Do so from the inputs before the record on; it is kept, because most parameters do not change it."""
         terms = self.plant.on("input", channel)
         if not terms:
-            return self.u[channel]
+            return self._whole[channel]
         values = [theta[self.plant.part_of(term)] for term in terms]
         remembered = () if start is None else zip(self.plant.remembered, start.T, strict=False)
         begun = {term.key: of_term for term, of_term in remembered if term in terms}
         key = np.concatenate([[channel], *values, *begun.values()]).tobytes()
         if key not in self._arrived:
-            u = self.u[channel]
+            u, first = self._whole[channel], self._first
             for term, p in zip(terms, values, strict=True):
                 assert isinstance(term.effect, InputEffect)
-                if term.key in begun:
+                if term.key in begun and term.effect.forgets:
+                    u = np.concatenate(
+                        (u[:, :first], term.effect.term_from(u[:, first:], p, self.h, begun[term.key])), axis=1
+                    )
+                elif term.key in begun:
                     u = term.effect.term_from(u, p, self.h, begun[term.key])
                 elif term.effect.of_time:
-                    u = term.effect.term_since(u, p, self.h, self.since)
+                    u = term.effect.term_since(u, p, self.h, self.since - first * self.h)
                 else:
                     u = term.effect.term(u, p, self.h)
             if len(self._arrived) > 1 + len(values):

@@ -69,7 +69,7 @@ def usual_start(estimate: Estimate, records: Records, noise: Noise, n_init: int)
         mean, scatter = _of_starts(estimate.local[:, :q])
         runs = records
     else:
-        passed = Simulator(plant, records.u, records.since).states(
+        passed = Simulator(plant, records.u, records.past).states(
             estimate.theta[None], estimate.local[None, :, : plant.n_moving]
         )
         states = passed[0][records.mask][:, :q]

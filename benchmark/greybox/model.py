@@ -17,6 +17,7 @@ from simgap.greybox.initial_states import UsualStart, initial_states, usual_star
 from simgap.greybox.machine import Machine
 from simgap.greybox.noise import Noise, white
 from simgap.greybox.outliers import Outliers, flag, without_outliers
+from simgap.greybox.past import Past
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records, pieces_of
@@ -110,24 +111,24 @@ class FittedPlant:
 
     def simulate_whole(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
-        since: Float[np.ndarray, " B"] | None = None,
+        past: Past | None = None,
     ) -> Float[np.ndarray, "B T ny"]:  # fmt: skip
         """Simulate all rows, from the initial state that suits the n measured samples best."""
         plant, theta = self.forecast.plant, self.forecast.theta
-        return Simulator(plant, u, since).run(theta, self.start(u, y_init, since))
+        return Simulator(plant, u, past).run(theta, self.start(u, y_init, past))
 
     def simulate_training(self) -> Float[np.ndarray, "E T ny"]:
         """Simulate the training records from the initial states that suit all of each best."""
         one = self.forecast
-        return Simulator(one.plant, self.records.u, self.records.since).run(one.theta, one.local)
+        return Simulator(one.plant, self.records.u, self.records.past).run(one.theta, one.local)
 
     def start(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
-        since: Float[np.ndarray, " B"] | None = None,
+        past: Past | None = None,
     ) -> Float[np.ndarray, "B q"]:  # fmt: skip
         """Find the initial states: from the first n samples, and from where the training records start."""
         plant, theta, n = self.forecast.plant, self.forecast.theta, y_init.shape[1]
-        beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt, since), self.noise)
+        beginning = Problem(plant, Records.measured(u[:, :n], y_init, plant.dt, past), self.noise)
         found = initial_states(beginning, theta)
         return self.usual.beside(beginning, theta, found) if self.usual else found
 
@@ -150,13 +151,13 @@ class FittedPlant:
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:
         """Simulate rows n_init .. T-1 with what belongs to this experiment alone estimated from all of it."""
         plant, outputs = self.estimate.plant, list(self.outputs)
-        u, y, since = experiment.u[None], experiment.y[None][:, :, outputs], np.array([experiment.since])
-        start = self.start(u, y[:, :n_init], since)
-        y_hat = Simulator(self.forecast.plant, u, since).run(self.forecast.theta, start)[0, n_init:]
+        u, y, past = experiment.u[None], experiment.y[None][:, :, outputs], Past.of([experiment])
+        start = self.start(u, y[:, :n_init], past)
+        y_hat = Simulator(self.forecast.plant, u, past).run(self.forecast.theta, start)[0, n_init:]
         if not np.max(np.abs(y_hat), initial=0.0) < LARGEST_VALUE:
             return y_hat  # it grew without bound, which nothing of this experiment can mend
         if plant.per_experiment:
-            y_hat = self._with_own(Records.measured(u, y, experiment.dt, since), start, n_init)
+            y_hat = self._with_own(Records.measured(u, y, experiment.dt, past), start, n_init)
         if self.outliers:
             error = y[0, n_init:] - y_hat
             flags = flag(error[None], np.ones((1, len(error)), dtype=bool), self.outliers)[0]
@@ -213,23 +214,23 @@ class GreyBoxModel:
 
     def simulate(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
-        since: Float[np.ndarray, " B"] | None = None,
+        past: Past | None = None,
     ) -> Float[np.ndarray, "B T-n ny"]:  # fmt: skip
         """Simulate from the state found in the n measured samples; what belongs to one experiment is not forecast.
 
-        `since`: seconds that the machine had run before the first row, 0 where nothing is said.
+        The records begin where their runs do if nothing is said of their past.
         """
-        return self.simulate_whole(u, y_init, since)[:, y_init.shape[1] :]
+        return self.simulate_whole(u, y_init, past)[:, y_init.shape[1] :]
 
     def simulate_whole(
         self, u: Float[np.ndarray, "B T nu"], y_init: Float[np.ndarray, "B n ny"],
-        since: Float[np.ndarray, " B"] | None = None,
+        past: Past | None = None,
     ) -> Float[np.ndarray, "B T ny"]:  # fmt: skip
         """Simulate all rows from that state, those of the measured samples too."""
         y_hat = np.empty((*u.shape[:2], y_init.shape[2]))
         for plant in self.plants:
             outputs = list(plant.outputs)
-            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs], since)
+            y_hat[:, :, outputs] = plant.simulate_whole(u, y_init[:, :, outputs], past)
         return y_hat
 
     def simulate_anew(self, experiment: Experiment, n_init: int) -> Float[np.ndarray, "N ny"]:

@@ -44,7 +44,7 @@ class Problem:
 
     def __init__(self, plant: Plant, records: Records, noise: Noise) -> None:
         self.plant, self.records, self.noise = plant, records, noise
-        self.simulator = Simulator(plant, records.u, records.since)
+        self.simulator = Simulator(plant, records.u, records.past)
         # The readings in training tell the sizes of the outputs, not the few samples that may be at hand.
         self._sizes = plant.scales.output_sizes[: plant.ny] if plant.scales else records.sizes
         # What rounding adds to the square of each reading: a perfect fit has that, and none is better. [ny]

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
+from simgap.greybox.past import Past
 from simgap.records import Experiment
 
 # The search uses so many samples, spread over the records; the final fit uses all.
@@ -32,7 +33,7 @@ class Records:
     y: Float[np.ndarray, "E T ny"]
     mask: Bool[np.ndarray, "E T"]
     dt: float
-    since: Float[np.ndarray, " E"]  # s that the machine had run before the first sample
+    past: Past
     soft: float = 0.0  # errors beyond it count by their size, not by its square; 0: all count by the square
 
     @classmethod
@@ -48,17 +49,16 @@ class Records:
             np.stack([padded(x.y[:, list(outputs)]) for x in experiments]),
             np.stack([np.arange(longest) < len(x) for x in experiments]),
             experiments[0].dt,
-            np.array([x.since for x in experiments]),
+            Past.of(experiments),
         )
 
     @classmethod
     def measured(
         cls, u: Float[np.ndarray, "E T nu"], y: Float[np.ndarray, "E T ny"], dt: float,
-        since: Float[np.ndarray, " E"] | None = None,
+        past: Past | None = None,
     ) -> Records:  # fmt: skip
         """Take records of one length, with every sample measured, that begin where their runs do if nothing is said."""
-        since = np.zeros(len(u)) if since is None else since
-        return cls(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), dt, since)
+        return cls(np.ascontiguousarray(u), y, np.ones(y.shape[:2], dtype=bool), dt, past or Past.none(u))
 
     @cached_property
     def sizes(self) -> Float[np.ndarray, " ny"]:
@@ -87,8 +87,8 @@ class Records:
 
     def only(self, experiments: np.ndarray) -> Records:
         """Return some of the experiments."""
-        u, y, mask, since = (values[experiments] for values in (self.u, self.y, self.mask, self.since))
-        return Records(u, y, mask, self.dt, since, self.soft)
+        u, y, mask = (values[experiments] for values in (self.u, self.y, self.mask))
+        return Records(u, y, mask, self.dt, self.past.only(experiments), self.soft)
 
     def beginning(self, samples: int) -> Records:
         """Return the first samples of each experiment."""
@@ -104,7 +104,8 @@ class Records:
 
     def _between(self, first: int, last: int) -> Records:
         u, y, mask = (values[:, first:last] for values in (self.u, self.y, self.mask))
-        return Records(np.ascontiguousarray(u), y, mask, self.dt, self.since + self.dt * first, self.soft)
+        past = self.past.at(np.array([first]), self.u, self.dt)
+        return Records(np.ascontiguousarray(u), y, mask, self.dt, past, self.soft)
 
     def pieces(self, samples: int) -> Records:
         """Cut every experiment into pieces of so many samples; what is left over at its end is dropped."""
@@ -114,8 +115,8 @@ class Records:
             whole = values[:, : count * samples]
             return np.ascontiguousarray(whole.reshape(-1, samples, *values.shape[2:]))
 
-        since = self.since[:, None] + self.dt * samples * np.arange(count)
-        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt, since.ravel(), self.soft)
+        past = self.past.at(samples * np.arange(count), self.u, self.dt)
+        return Records(cut(self.u), cut(self.y), cut(self.mask), self.dt, past, self.soft)
 
     @property
     def duration(self) -> float:

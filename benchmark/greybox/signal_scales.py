@@ -37,7 +37,7 @@ def scales_of(estimate: Estimate, problem: Problem, channels: Channels, outputs:
 
     rate = "/s" if plant.by_rate else ""
     errors = estimate.errors[:, :, 0]
-    together, whatever_phase = lines(errors, records.dt, records.since), tones(errors, records.dt)
+    together, whatever_phase = lines(errors, records.dt, records.past.since), tones(errors, records.dt)
 
     def scales(i: int, j: int) -> SignalScales:
         u, y = arriving[i][records.mask], records.y[records.mask][:, j]

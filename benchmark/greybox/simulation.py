@@ -17,6 +17,7 @@ from simgap.greybox.kernels import SLOTS, TERM, follow_motion, run_body, run_tan
 from simgap.greybox.linear_kernels import read, run_linear, transitions
 from simgap.greybox.machine import BACK_EMF, DAMPING, DERIVATIVE, STIFFNESS
 from simgap.greybox.machine_kernels import run_machine
+from simgap.greybox.past import Past
 from simgap.greybox.plant import Plant
 from simgap.greybox.terms import Term
 from simgap.greybox.two_masses import ENTRY
@@ -89,14 +90,12 @@ def distinct(values: Float[np.ndarray, "S k"]) -> tuple[np.ndarray, np.ndarray]:
 class Simulator:
     """One plant on the inputs of several experiments, u [E, T, nu]; shorter ones are padded by the caller.
 
-    `since` [E]: seconds that the machine had run before the first sample; 0 where nothing is said.
+    They begin where their runs do if nothing is said of their past.
     """
 
-    def __init__(
-        self, plant: Plant, u: Float[np.ndarray, "E T nu"], since: Float[np.ndarray, " E"] | None = None
-    ) -> None:
+    def __init__(self, plant: Plant, u: Float[np.ndarray, "E T nu"], past: Past | None = None) -> None:
         self.plant = plant
-        self.drive = Drive(plant, u, since)
+        self.drive = Drive(plant, u, past)
         self.substeps, self.h = self.drive.substeps, self.drive.h
         self.t = plant.dt * np.arange(u.shape[1])  # [T]
         self.shape = u.shape

@@ -144,7 +144,7 @@ def test_the_json_has_the_budget_of_every_output(named):
 
 def test_a_run_in_which_a_known_machine_stuck_is_named():
     class Follows(GreyBoxModel):
-        def simulate(self, u, y_init, since=None):
+        def simulate(self, u, y_init, past=None):
             return u[:, y_init.shape[1] :]
 
     rng = np.random.default_rng(0)

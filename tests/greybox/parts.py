@@ -9,6 +9,7 @@ from simgap.greybox import noise, outliers, samples, signal_scales, subspace_sta
 from simgap.greybox.effects.scales import SignalScales
 from simgap.greybox.fitting import descend
 from simgap.greybox.normal_equations import Jacobian, NormalEquations
+from simgap.greybox.past import Past
 from simgap.greybox.plant import Plant
 from simgap.greybox.problem import Problem
 from simgap.greybox.samples import Records
@@ -36,7 +37,7 @@ def channels(kind, ny=1):
 def records(u, y, dt, measured=None):
     """Records side by side: u [E, T], y [E, T, ny], measured [E, T]."""
     seen = np.ones(u.shape, dtype=bool) if measured is None else measured
-    return Records(np.ascontiguousarray(u[:, :, None]), y, seen, dt, np.zeros(len(u)))
+    return Records(np.ascontiguousarray(u[:, :, None]), y, seen, dt, Past.none(u[:, :, None]))
 
 
 def term(name):
