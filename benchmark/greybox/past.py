@@ -50,7 +50,7 @@ class Past:
         rows = known + starts[:, None] - length + np.arange(length)
         inputs = run[:, np.maximum(rows, 0)]  # [E, S, length, nu]
         since = self.since[:, None] + dt * starts
-        return Past(since.ravel(), inputs.reshape(-1, length, u.shape[2]))
+        return Past(since.ravel(), inputs.reshape(since.size, length, u.shape[2]))
 
     def beside(self, other: Past) -> Past:
         """Return that of these records followed by others, of which as much is told."""

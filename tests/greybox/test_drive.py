@@ -8,6 +8,7 @@ from simgap.greybox.drive import Drive
 from simgap.greybox.effects.dead_zone import DeadZone
 from simgap.greybox.effects.load_drift import LoadDrift
 from simgap.greybox.effects.periodic_disturbance import AnyPhase
+from simgap.greybox.past import Past
 from simgap.greybox.plant import Plant
 from simgap.greybox.simulation import Simulator
 from simgap.greybox.terms import PlantScales, Term
@@ -37,7 +38,9 @@ def test_a_record_cut_in_two_is_simulated_as_the_whole_one(effect, values):
     theta = np.array([1.5, 2.0, *values])  # pole, gain
     u = np.random.default_rng(0).standard_normal((1, 100, 1))
     whole = Simulator(plant, u).states(theta[None], np.zeros((1, 1, 1)))[0]
-    later = Simulator(plant, u[:, 60:], np.array([6.0])).states(theta[None], whole[None, :, 60])[0]
+    later = Simulator(plant, u[:, 60:], Past.none(u).at(np.array([60]), u, plant.dt)).states(
+        theta[None], whole[None, :, 60]
+    )[0]
     np.testing.assert_allclose(later, whole[:, 60:], atol=5e-3)  # the first step extrapolates no force
     anew = Simulator(plant, u[:, 60:]).states(theta[None], whole[None, :, 60])[0]
     assert np.abs(anew - whole[:, 60:]).max() > 0.1
