@@ -33,6 +33,7 @@ class Hybrid:
     """
 
     stochastic: ClassVar[bool] = True
+    takes_known: ClassVar = True  # what is known of the machine
     parts: ClassVar = (Design, Features, FilterNetwork, Rest, RestOfOutput)  # records in a saved model
 
     grey: GreyBox = field(init=False, repr=False)

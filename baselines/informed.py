@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +25,8 @@ class Informed:
     d_i(t) = y_hat(t; all effects) - y_hat(t; all but effect i), both simulated from the same start; no measured
     output after the start enters. inner: name of the other model; effects: as for `greybox`, None to find them.
     """
+
+    takes_known: ClassVar = True  # what is known of the machine
 
     inner: str = "arx"
     effects: Sequence[str] | None = None

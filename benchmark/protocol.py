@@ -23,6 +23,7 @@ class Model(Protocol):
     of a model that estimates on the validation data too: the model before it did, whose error on them is an honest one.
     `held_out_error`, where a few numbers of that model are theirs all the same: its cross-validated error on them.
     `earlier_seconds`, where a fit carried on from an interrupted one: the seconds of that, which count in the results.
+    A class whose `takes_known` is True makes use of what is known of the machine, `data.channels.plant`.
     A fitted model is saved attribute by attribute; `simgap.saved` says what it may declare for that.
     """
 

@@ -23,6 +23,7 @@ from simgap.cli.options import (
     model_faults,
     parse_params,
     read_data,
+    refuse,
     write_json,
 )
 
@@ -65,6 +66,8 @@ def fit(
         name_of(fitting.model_class(model))  # refuses what no file could name
     console = Console()
     fitting.check_params(model, params)  # first, because data may take seconds to load
+    if not getattr(fitting.model_class(model), "takes_known", False):
+        refuse({"known": known}, f"{model} cannot be told of the machine; grey boxes can, such as greybox-auto")
     dataset = read_data(data, inputs, outputs, dt, kind, resample, split_gaps, known).dataset
     with model_faults("fit"), _progress(console):
         done = fitting.fit(model, dataset, params, seed)

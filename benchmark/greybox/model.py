@@ -209,6 +209,7 @@ class GreyBoxModel:
         UsualStart,
     )  # fmt: skip
     saved_as: ClassVar = "greybox"
+    takes_known: ClassVar = True  # what is known of the machine
 
     plants: list[FittedPlant] = field(default_factory=list, repr=False)
 

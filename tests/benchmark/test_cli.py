@@ -162,6 +162,15 @@ def test_a_misspelt_name_is_answered_with_the_one_that_is_meant(capsys, folder):
     assert "called 'arxx'; is arx" in run(capsys, "fit", "arxx", folder)[2]
 
 
+@pytest.mark.parametrize("model", ["arx", "mean", "gru"])
+def test_what_is_known_of_the_machine_is_refused_for_models_that_make_no_use_of_it(capsys, folder, model):
+    code, _, err = run(capsys, "fit", model, folder, "--known", "mass=0.5kg")
+    assert code == 2
+    assert err.strip() == (
+        f"simgap: --known: {model} cannot be told of the machine; grey boxes can, such as greybox-auto"
+    )
+
+
 def test_data_check_says_what_a_folder_holds(capsys, folder):
     code, out, _ = run(capsys, "data", "check", folder)
     assert code == 0
