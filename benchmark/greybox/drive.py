@@ -117,12 +117,10 @@ class Drive:
             u, first = self._whole[channel], self._first
             for term, p in zip(terms, values, strict=True):
                 assert isinstance(term.effect, InputEffect)
-                if term.key in begun and term.effect.forgets:
+                if term.key in begun:  # like the plant's states, found in the first samples, whatever came before
                     u = np.concatenate(
                         (u[:, :first], term.effect.term_from(u[:, first:], p, self.h, begun[term.key])), axis=1
                     )
-                elif term.key in begun:
-                    u = term.effect.term_from(u, p, self.h, begun[term.key])
                 elif term.effect.of_time:
                     u = term.effect.term_since(u, p, self.h, self.since - first * self.h)
                 else:

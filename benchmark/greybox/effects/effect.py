@@ -70,8 +70,6 @@ class Effect(ABC):
     memory: ClassVar[int] = 0
     # They begin anywhere, where those of a force on a body else begin at zero.
     begins_anywhere: ClassVar[bool] = False
-    # It begins with what is told of the start of each record, whatever came before: it fades where nothing changes.
-    forgets: ClassVar[bool] = False
     # What the simulation does with the value of a force term.
     role: ClassVar[Role] = "force"
     # Substeps per sample that the term needs.

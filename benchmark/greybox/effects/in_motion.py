@@ -12,7 +12,6 @@ class InMotion(Effect):
     """A law whose records begin away from where it would settle, by the share of a signal's range that each tells."""
 
     memory: ClassVar[int] = 1
-    forgets: ClassVar[bool] = True
 
     def parameters(self, scales: SignalScales) -> tuple[Parameter, ...]:
         """Return those of the settled law, and the range of the input or the reading."""
