@@ -12,7 +12,7 @@ from simgap.data.loading import read
 from simgap.diagnosis import doubts
 from simgap.experiment_design.answer import CERTAIN, NextRecord, is_alike, narrowed
 from simgap.experiment_design.limits import Limits, Range, limits_of
-from simgap.experiment_design.rivals import WIDE, Question, question_of
+from simgap.experiment_design.rivals import WIDE, Question, question_of, with_outputs
 from simgap.experiment_design.search import Design, best_record
 from simgap.greybox.identification import Identified, identify
 from simgap.records import Channels, Dataset
@@ -50,7 +50,7 @@ def next_record(
         return NextRecord(dataset.name, channels, limits, (), None, doubt=doubt)
     with all_cores():
         identified = identify(training)
-        questions = [question_of(one) for one in identified]
+        questions = with_outputs([question_of(one) for one in identified], channels)
         design, wider = None, {}
         if any(question.pairs for question in questions):
             rivals = any(question.pairs and not question.interval for question in questions)

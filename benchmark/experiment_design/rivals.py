@@ -24,6 +24,7 @@ from simgap.greybox.samples import Records
 from simgap.greybox.selection import Selection
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, significant
+from simgap.records import Channels
 from simgap.wording import amount
 
 MOST = 4  # rivals of one plant
@@ -121,6 +122,19 @@ def question_of(identified: Identified) -> Question:
         name, width, low, high = ends
         return Question((rivals[0], low, high), ((1, 2),), *of_plant, interval=name, width=width)
     return Question(tuple(rivals), (), *of_plant)
+
+
+def with_outputs(questions: Sequence[Question], channels: Channels) -> list[Question]:
+    """Add the outputs to the titles where there are several plants, which may leave the same open."""
+    if len(questions) == 1:
+        return list(questions)
+
+    def named(question: Question) -> Question:
+        output = " for " + " and ".join(channels.outputs[j].name for j in question.outputs)
+        rivals = tuple(replace(rival, title=rival.title + output) for rival in question.rivals)
+        return replace(question, rivals=rivals, interval=question.interval and question.interval + output)
+
+    return list(map(named, questions))
 
 
 def _near(selection: Selection) -> list[tuple[float, Trial]]:

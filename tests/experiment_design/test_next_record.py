@@ -12,6 +12,7 @@ import simgap
 from simgap.cli import main
 from simgap.data.simulated.rigs import hide
 from simgap.experiment_design.limits import limits_of
+from simgap.experiment_design.rivals import with_outputs
 from simgap.experiment_design.search import best_record
 from simgap.records import Channel, Channels, Dataset, Experiment, TrainingSet, UnusableInput
 
@@ -27,6 +28,15 @@ def data():
 @pytest.fixture(scope="module")
 def answer(data):
     return simgap.next_record(data, input_range=(-4.0, 3.0), rate=30.0, seconds=6.0, travel=(-1.5, 1.6))
+
+
+def test_what_two_outputs_leave_open_is_told_apart_by_their_names(answer):
+    (question,) = answer.questions
+    assert with_outputs([question], answer.channels) == [question]
+    of_both = with_outputs([question, replace(question, outputs=(1,))], Channels.unnamed(1, 2))
+    pairs = replace(answer, questions=tuple(of_both)).rivals
+    assert len(set(pairs)) == 2 * len(question.pairs)
+    assert {title.rpartition(" for ")[2] for pair in pairs for title in pair} == {"y0", "y1"}
 
 
 def test_what_the_records_leave_open_is_named_with_the_record_that_decides(answer):
