@@ -6,9 +6,9 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from simgap.greybox.additions import add, from_other_poles
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect, InputEffect
+from simgap.greybox.extension import add, from_other_poles
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.machine_baseline import find_machine_baseline

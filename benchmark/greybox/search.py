@@ -7,19 +7,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.additions import (
-    Among,
-    Extended,
-    add,
-    as_special_case,
-    extend,
-    from_other_poles,
-    known_fits,
-    refine,
-    simpler,
-    with_any_more,
-)
+from simgap.greybox.additions import Among, Extended, known_fits, with_any_more
 from simgap.greybox.baseline import Baseline
+from simgap.greybox.extension import add, as_special_case, extend, from_other_poles, refine, simpler
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.noise import log_likelihood

@@ -12,8 +12,9 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
-from simgap.greybox.additions import add, refine, with_any_more
+from simgap.greybox.additions import with_any_more
 from simgap.greybox.evidence import Evidence
+from simgap.greybox.extension import add, refine
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import detrended as _detrended
 from simgap.greybox.identification import Identified, identify
