@@ -40,16 +40,4 @@ def modes_table(results: Sequence[Result]) -> Table | None:
         "then the network runs free, trained on sequences. Windowed (the paper's): 40 samples of time and inputs in, "
         "the next outputs out, no state."
     ]
-    epochs = [_mean_epochs(results, models) for models in (networks, [name + WINDOWED for name in networks])]
-    if all(epochs):
-        notes.append(
-            f"Not alike in training: {epochs[0]:.0f} epochs stateful and {epochs[1]:.0f} windowed, in the mean."
-        )
     return Table("Networks with a state and on windows", columns, rows, notes)
-
-
-def _mean_epochs(results: Sequence[Result], models: Sequence[str]) -> float:
-    """Average the epochs of all fits of these models; 0 where none says any."""
-    fits = {(row.model, row.dataset, row.seed): row.fitted.get("epochs") for row in results if row.model in models}
-    known = [epochs for epochs in fits.values() if epochs]
-    return sum(known) / len(known) if known else 0.0

@@ -28,7 +28,7 @@ def test_the_recovery_study_is_listed_and_named_wherever_suites_are(capsys, tmp_
     assert main(["list", "suites", "--json", str(tmp_path / "suites.json")]) == 0
     assert "recovery" in {entry["name"] for entry in json.loads((tmp_path / "suites.json").read_text())}
     assert main(["run", "nosuch"]) == 2
-    assert "windows, recovery" in capsys.readouterr().err
+    assert "tuned, recovery" in capsys.readouterr().err
     main(["run", "--help"])
     assert "`simgap run recovery` is a study instead" in capsys.readouterr().out
 
