@@ -87,7 +87,7 @@ class Experiment:
 
     def __post_init__(self) -> None:
         if self.before is None:
-            object.__setattr__(self, "before", np.asarray(self.u)[:0])
+            object.__setattr__(self, "before", np.asarray(self.u)[:0].copy())
         for column, shape in (("u", "[T, nu]"), ("y", "[T, ny]"), ("before", "[P, nu]")):
             values = np.asarray(getattr(self, column), dtype=np.float64).view()
             if values.ndim != 2:
@@ -170,7 +170,7 @@ class TrainingSet:
     def as_runs(self) -> TrainingSet:
         """Return the same records as if each were a run of its own, for models that are not told what came before."""
         train, valid = (
-            tuple(replace(x, since=0.0, before=x.u[:0]) for x in records) for records in (self.train, self.valid)
+            tuple(replace(x, since=0.0, before=x.u[:0].copy()) for x in records) for records in (self.train, self.valid)
         )
         return replace(self, train=train, valid=valid)
 

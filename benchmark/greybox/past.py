@@ -46,7 +46,7 @@ class Past:
         """Return that of pieces [E * S] of the records with inputs u that begin at these samples, 0 being the first."""
         run = np.concatenate((self.u, u), axis=1)
         known = self.u.shape[1]
-        length = min(LONGEST_PAST, known + int(starts.max()))
+        length = min(LONGEST_PAST, known + int(starts.max(initial=0)))
         rows = known + starts[:, None] - length + np.arange(length)
         inputs = run[:, np.maximum(rows, 0)]  # [E, S, length, nu]
         since = self.since[:, None] + dt * starts

@@ -128,6 +128,10 @@ def test_the_second_half_of_a_record_knows_the_first():
     assert later.past.since == pytest.approx([40 * DT])
 
 
+def test_a_record_without_one_whole_piece_has_none():
+    assert Records.of([run_of(20)], (0,)).pieces(30).past.u.shape == (0, 0, 1)
+
+
 def heater(rng):
     """A heater with a dead time of 12 samples; of 2000 samples, a step is 8 samples before the last fifth."""
     u = np.repeat(rng.choice([0.0, 20.0, 40.0, 60.0, 80.0, 100.0], 25), 66)[:1608]
