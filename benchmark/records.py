@@ -170,7 +170,7 @@ class TrainingSet:
     def as_runs(self) -> TrainingSet:
         """Return the same records as if each were a run of its own, for models that are not told what came before."""
         train, valid = (
-            tuple(replace(x, since=0.0, before=x.u[:0].copy()) for x in records) for records in (self.train, self.valid)
+            tuple(Experiment(x.name, x.u, x.y, x.dt) for x in records) for records in (self.train, self.valid)
         )
         return replace(self, train=train, valid=valid)
 

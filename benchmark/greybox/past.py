@@ -44,9 +44,9 @@ class Past:
 
     def at(self, starts: Int64[np.ndarray, " S"], u: Float[np.ndarray, "E T nu"], dt: float) -> Past:
         """Return that of pieces [E * S] of the records with inputs u that begin at these samples, 0 being the first."""
-        run = np.concatenate((self.u, u), axis=1)
-        known = self.u.shape[1]
-        length = min(LONGEST_PAST, known + int(starts.max(initial=0)))
+        known, last = self.u.shape[1], int(starts.max(initial=0))
+        run = np.concatenate((self.u, u[:, :last]), axis=1)
+        length = min(LONGEST_PAST, known + last)
         rows = known + starts[:, None] - length + np.arange(length)
         inputs = run[:, np.maximum(rows, 0)]  # [E, S, length, nu]
         since = self.since[:, None] + dt * starts
