@@ -6,15 +6,16 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from simgap.greybox.additions import add
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect, InputEffect
-from simgap.greybox.extension import add, from_other_poles
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.model import FittedPlant, GreyBoxModel
 from simgap.greybox.plant import Plant
 from simgap.greybox.position_and_velocity import plants_of
+from simgap.greybox.refits import from_other_poles
 from simgap.greybox.terms import Term
 from simgap.records import Channel, TrainingSet, UnusableInput
 from simgap.registry import EFFECTS, MODELS

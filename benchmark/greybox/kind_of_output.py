@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from simgap.greybox.additions import Extended, with_any_more
+from simgap.greybox.additions import Extended, extend, with_any_more
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.effects.effect import Effect
-from simgap.greybox.extension import extend
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.noise import schwarz_order

@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 
 from simgap.greybox import dynamics
+from simgap.greybox.additions import add
 from simgap.greybox.baseline import Baseline
 from simgap.greybox.data_checks import check_numbers
-from simgap.greybox.extension import add, refine
 from simgap.greybox.fitting import Estimate, descend
 from simgap.greybox.held_out import as_good_as_best, block_errors, errors_on, in_most
 from simgap.greybox.noise import Noise, log_likelihood, schwarz_order, white, white_as_large_as
@@ -20,6 +20,7 @@ from simgap.greybox.outliers import find_outliers, without_outliers
 from simgap.greybox.plant import Plant
 from simgap.greybox.pole_search import fit_from, fit_plain
 from simgap.greybox.problem import Problem
+from simgap.greybox.refits import refine
 from simgap.greybox.samples import Records, excerpts, is_cut
 from simgap.greybox.score_test import candidates
 from simgap.greybox.signal_scales import scales_of

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from simgap.cores import on_cores
-from simgap.greybox.additions import Among, Extended, known_fits, with_any_more
+from simgap.greybox.additions import Among, Extended, add, extend, known_fits, with_any_more
 from simgap.greybox.baseline import Baseline
-from simgap.greybox.extension import add, as_special_case, extend, from_other_poles, refine, simpler
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import in_most
 from simgap.greybox.noise import log_likelihood
+from simgap.greybox.refits import as_special_case, from_other_poles, refine, simpler
 from simgap.greybox.score_test import candidates
 from simgap.greybox.terms import Term
 from simgap.greybox.trial import Trial, assess, assessed, beyond_chance, holds_out, judged, ranked, significant

@@ -12,7 +12,7 @@ from simgap.experiment_design.rivals import Question, rival_of
 from simgap.experiment_design.search import decides
 from simgap.experiment_design.separation import refitted, separations, simulate
 from simgap.experiment_design.signals import Shape
-from simgap.greybox.extension import add
+from simgap.greybox.additions import add
 from simgap.greybox.linear import find_baseline
 from simgap.greybox.noise import white_as_large_as
 from simgap.greybox.terms import Term

@@ -12,14 +12,14 @@ import numpy as np
 from simgap.greybox import leftover as _leftover
 from simgap.greybox import linear
 from simgap.greybox import samples as _samples
-from simgap.greybox.additions import with_any_more
+from simgap.greybox.additions import add, with_any_more
 from simgap.greybox.evidence import Evidence
-from simgap.greybox.extension import add, refine
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import detrended as _detrended
 from simgap.greybox.identification import Identified, identify
 from simgap.greybox.intervals import intervals
 from simgap.greybox.model import FittedPlant
+from simgap.greybox.refits import refine
 from simgap.greybox.samples import Records
 from simgap.greybox.score_test import candidates as _candidates
 from simgap.greybox.score_test import score_tests

@@ -10,7 +10,7 @@ from simgap.data.formats.plant_table import read_plant
 from simgap.data.simulated.rigs import hide, physical
 from simgap.data.simulated.rigs.plants import RIGS
 from simgap.diagnosis.diagnose import diagnose
-from simgap.greybox.extension import extend
+from simgap.greybox.additions import extend
 from simgap.greybox.machine import INERTIA, NAMES, machine_of
 from simgap.greybox.machine_baseline import find_machine_baseline
 from simgap.greybox.terms import Term
