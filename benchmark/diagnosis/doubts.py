@@ -12,7 +12,7 @@ from simgap.greybox.baseline import Baseline
 from simgap.greybox.fitting import Estimate
 from simgap.greybox.held_out import BLOCKS, in_most
 from simgap.greybox.identification import Identified
-from simgap.greybox.samples import PIECE
+from simgap.greybox.samples import PIECE, Records
 from simgap.greybox.selection import Selection
 from simgap.greybox.trial import has_pieces, squares_in_pieces
 from simgap.records import Channels, Experiment, TrainingSet
@@ -23,6 +23,7 @@ ALIKE = 0.98
 FEW = 100  # samples
 ENOUGH = 200  # training samples; with fewer, weak effects do not stand out from noise
 CERTAIN = 2.0  # standard errors of a correlation
+STILL = 0.1  # of how an output moves in training: how it moves in a record in which it stands still
 
 
 def of_records(training: TrainingSet, channels: Channels) -> str | None:
@@ -91,9 +92,9 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
     baseline, trial = selection.baseline, selection.trial
     if in_most(baseline.blocks_of_mean - trial.blocks) or (trial.terms and _better_in_pieces(baseline, trial.estimate)):
         return None
-    records, plant = baseline.train, trial.estimate.plant
-    read = [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]
+    records, plant, read = baseline.train, trial.estimate.plant, _readings(baseline.train)
     means, within = np.array([y.mean() for y in read]), np.sqrt(np.mean([y.var() for y in read]))
+    still = [y.std() < STILL * within for y in _readings(baseline.valid)]
     poles = -np.real(dynamics.poles(plant, trial.estimate.theta)) if plant.order else np.ones(1)
     name = channels.outputs[baseline.outputs[0]].name
     if not np.ptp(np.concatenate(read)):
@@ -104,9 +105,16 @@ def beaten_by_mean(selection: Selection, channels: Channels) -> str | None:
         why = f"{name} integrates, so that the smallest offset grows. Record shorter runs, each from a known level"
     elif baseline.valid.samples < FEW:
         why = f"the held-out data have {baseline.valid.samples} samples. Record more"
+    elif any(still):
+        where = "the held-out record" if len(still) == 1 else f"{sum(still)} of the {len(still)} held-out records"
+        why = f"{name} stands still in {where}. Keep it moving to the end of each record"
     else:
         why = f"the inputs do not move {name} enough. Move them more, and faster"
     return f"No model simulates held-out {name} better than its mean, because {why}."
+
+
+def _readings(records: Records) -> list[Float[np.ndarray, " N"]]:
+    return [y[known, 0] for y, known in zip(records.y, records.mask, strict=True) if known.any()]
 
 
 def _better_in_pieces(baseline: Baseline, estimate: Estimate) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from simgap.diagnosis.diagnose import diagnose
 from simgap.diagnosis.doubts import of_records, shows_controller
@@ -71,6 +72,24 @@ def test_nothing_is_named_where_the_mean_is_the_better_model(levels, said):
     answer = diagnose(Dataset("unrelated", training, (test,), 10, channels), views_too=False)
     assert not answer.causes
     assert any("better than its mean" in sentence and said in sentence for sentence in answer.findings.doubts)
+
+
+@pytest.mark.slow
+def test_where_a_held_out_record_stands_still_it_is_said_to_tell_nothing():
+    rng = np.random.default_rng(0)
+
+    def run(name, moves):
+        u = np.repeat(rng.uniform(-1, 1, 60), 10)[:, None]
+        return Experiment(
+            name, u, lfilter([0, 0.1], [1, -0.9], moves * u, axis=0) + 0.01 * rng.standard_normal(u.shape), 1.0
+        )
+
+    *train, valid, test = [run(f"e{i}", moves) for i, moves in enumerate((1, 1, 1, 0, 1))]
+    channels = Channels((Channel("u", "V"),), (Channel("y", "m/s", "velocity"),))
+    training = TrainingSet(tuple(train), (valid,), 10, channels)
+    answer = diagnose(Dataset("stuck", training, (test,), 10, channels), views_too=False)
+    assert not answer.causes
+    assert any("y stands still in the held-out record" in sentence for sentence in answer.findings.doubts)
 
 
 @pytest.mark.parametrize("level", [0.0, 3.0])
