@@ -83,7 +83,7 @@ def run(folder: Path, *command: str) -> str:
     """What a command prints; it must end well and have nothing to complain about."""
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     done = subprocess.run(
-        command, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, check=False, timeout=300
+        command, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, check=False, timeout=900
     )
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     return done.stdout
