@@ -97,12 +97,7 @@ def refine(baseline: Baseline, estimate: Estimate, term: Term) -> Estimate | Non
     law, numbers = term.effect.refined, term.effect.as_refined(estimate.theta[estimate.plant.part_of(term)])
     if law is None or numbers is None:
         return None
-    fine = replace(term, effect=law())
-    plant = baseline.plant.having([fine if other == term else other for other in estimate.plant.terms])
-    theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-    part = plant.part_of(fine)
-    theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
-    return baseline.fit(plant.terms, [(theta, local)])
+    return _in_place_of(baseline, estimate, term, replace(term, effect=law()), numbers)
 
 
 def simpler(estimate: Estimate, term: Term) -> Mapping[str, np.ndarray]:
@@ -116,9 +111,13 @@ def simpler(estimate: Estimate, term: Term) -> Mapping[str, np.ndarray]:
 
 def as_special_case(baseline: Baseline, estimate: Estimate, general: Term, special: Term) -> Estimate:
     """Fit a model again with a special case in the place of an effect, begun with what the two share."""
-    plant = baseline.plant.having([*(term for term in estimate.plant.terms if term != general), special])
+    return _in_place_of(baseline, estimate, general, special, simpler(estimate, general)[special.effect.name])
+
+
+def _in_place_of(baseline: Baseline, estimate: Estimate, term: Term, other: Term, numbers: np.ndarray) -> Estimate:
+    """Fit a model again with another term in the place of one, begun with these numbers and the rest as it was."""
+    plant = baseline.plant.having([*(one for one in estimate.plant.terms if one != term), other])
     theta, local = plant.carry(estimate.plant, estimate.theta, estimate.local)
-    part = plant.part_of(special)
-    numbers = simpler(estimate, general)[special.effect.name]
+    part = plant.part_of(other)
     theta[part] = np.clip(numbers, plant.low[part], plant.high[part])
     return baseline.fit(plant.terms, [(theta, local)])
